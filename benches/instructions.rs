@@ -1,17 +1,17 @@
-//! Instructions of one phase, counted by `valgrind --tool=callgrind`: the same on every run, whatever
-//! else the machine does. `instructions/<phase>/<scene>/<width>/<passes>`.
+//! Instructions of one phase, counted by `valgrind --tool=callgrind`. The count is the same on every run,
+//! whatever the load of the machine: `instructions/<phase>/<scene>/<width>/<passes>`.
 //!
-//! Valgrind knows no AVX-512, so the build must not use it, and keeps to a folder of its own:
+//! Valgrind does not support AVX-512, so the build must not use it. It has a target folder of its own:
 //!
 //! ```sh
 //! RUSTFLAGS="-C target-cpu=x86-64-v3" cargo bench --features instructions --bench instructions \
 //!     --target-dir target/instructions
 //! ```
 //!
-//! An argument keeps the ids that contain it. Each id runs in a process of its own under
-//! valgrind, in which only `measured` is counted. Counts are kept beside the program, and the
-//! next run prints what has changed. Instructions are no time: where a sweep waits for memory
-//! or for its own results, fewer of them need not be faster (`simpulse profile` measures that).
+//! An argument selects the ids that contain it. Each id runs in its own process under valgrind, in which only
+//! `measured` is counted. Counts are stored next to the program, and the next run prints the differences.
+//! Instructions are not time: where a sweep waits for memory or for its own results, fewer instructions need
+//! not be faster (`simpulse profile` measures that).
 
 mod common;
 
@@ -23,7 +23,7 @@ use std::process::{Command, ExitCode};
 
 const SCENE: &str = "pyramid:30";
 const WIDTHS: [LaneWidth; 3] = [LaneWidth::W1, LaneWidth::W4, LaneWidth::W8];
-/// Phases and the names they have in the other benches.
+/// Phases, with the names they have in the other benches.
 const PHASES: [(&str, Phase); 5] = [
     ("soft", Phase::Solve),
     ("relax", Phase::Relax),
@@ -36,7 +36,7 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match arguments.as_slice() {
         [flag, id] if flag == "--one" => one(id),
-        // `cargo bench -- --test` asks for nothing to be measured.
+        // `cargo bench -- --test` measures nothing.
         _ if arguments.iter().any(|a| a == "--test") => ExitCode::SUCCESS,
         _ => all(arguments.iter().find(|a| !a.starts_with("--")).map_or("", String::as_str)),
     }
@@ -56,7 +56,7 @@ fn measured(run: &mut dyn FnMut()) {
     run();
 }
 
-/// Runs one id, in the process that valgrind watches.
+/// Runs one id, in the process that runs under valgrind.
 fn one(id: &str) -> ExitCode {
     let parts: Vec<&str> = id.split('/').collect();
     let [_, name, _, lanes, _] = parts[..] else { return ExitCode::from(2) };
@@ -118,7 +118,7 @@ fn read(kept: &PathBuf) -> BTreeMap<String, u64> {
     text.lines().filter_map(line).filter(|(_, count)| *count > 0).collect()
 }
 
-/// Instructions within `measured`, as callgrind sums them up.
+/// Instructions within `measured`, from callgrind's summary.
 fn count(program: &PathBuf, id: &str) -> Result<u64, String> {
     let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
     let out = folder.path().join("callgrind.out");

@@ -1,10 +1,10 @@
-//! One prepared set of batches, one pass: `kernel/<sweep>/<scene>/<width>/1`, and
+//! One pass over one prepared set of batches: `kernel/<sweep>/<scene>/<width>/1`, and
 //! `kernel/<pass over bodies>/<scene>/<width>/1`.
 //!
-//! Before anything is timed, 20 sweeps at the width must give the bits that 20 scalar
-//! sweeps give. Sweeps named `…_columns` keep the rows of bodies as a pure structure of arrays,
-//! the others packed, as solvers do. Criterion's throughput is in contacts (in bodies for passes over
-//! bodies), so `elem/s` inverts to ns per contact.
+//! Before anything is timed, 20 sweeps at the width must be bit-identical to 20 scalar sweeps. Sweeps named
+//! `…_columns` store body rows as a pure structure of arrays; the others store them packed, as solvers do.
+//! Criterion's throughput is in contacts (in bodies for passes over bodies), so `elem/s` inverts to ns per
+//! contact.
 
 mod common;
 
@@ -17,13 +17,13 @@ use simpulse::engine::lanes::{BodyRow, LaneWidth, Lanes, RowColumns};
 use std::hint::black_box;
 use wide::{f32x4, f32x8, f32x16};
 
-/// All needs of a pyramid of boxes.
+/// Every feature that a pyramid of boxes uses.
 type Boxes = Kernel<true, true, 2>;
 
-/// Contacts in second-level cache, in third-level cache, and at its edge or beyond.
+/// Scenes whose contacts fit in the second-level cache, in the third-level cache, and at its edge or beyond.
 const SCENES: [&str; 4] = ["pyramid:30", "large_pyramid", "many_pyramids", "pyramid:316"];
 
-/// What a sweep works on.
+/// Input of a sweep.
 #[derive(Clone)]
 struct Start {
     rows: Vec<BodyRow>,
@@ -37,7 +37,7 @@ impl Start {
         Start { rows: std::mem::take(rows), lanes: std::mem::take(lanes) }
     }
 
-    /// One sweep on packed rows, or on `columns` if there are any.
+    /// One sweep on packed rows, or on `columns` if given.
     fn sweep<R: NormalRule>(&mut self, columns: Option<&mut RowColumns>, rule: R) {
         fn at<L: Lanes, R: NormalRule>(start: &mut Start, columns: Option<&mut RowColumns>, rule: R) {
             match columns {
@@ -83,9 +83,10 @@ fn bench_rule<R: NormalRule>(c: &mut Criterion, name: &str, scene: &str, starts:
     group.finish();
 }
 
-/// Bytes that a pass moves for each body: velocities 16 + kick 16 + free 16 written, and as much
-/// again read and written of the row; positions: the row read, half of it written. A row is half a
-/// register of 8, so these passes have 4 lanes at any width.
+/// Bytes that a pass moves per body. Velocities: 16 of the row, 16 of the velocity increment and, with a warm
+/// start, 16 of the free velocity are read; 16 of the row and 16 of the free velocity are written. Positions:
+/// the row is read, and half of it is written. A row is half a register of 8, so these passes have 4 lanes at
+/// any width.
 fn bench_bodies(c: &mut Criterion) {
     let mut group = c.benchmark_group("kernel");
     group.sample_size(20);

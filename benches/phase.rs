@@ -1,12 +1,12 @@
-//! One phase of a step on a state that is held still: `phase/<phase>/<scene>/<width>/<substeps>`.
+//! One phase of a step on a frozen state: `phase/<phase>/<scene>/<width>/<substeps>`.
 //!
-//! The phase runs alone, all its passes of a step; what it changes is brought back every 100
-//! times, outside of the times. Before a scene is timed at a width, 30 steps must give the bits that
-//! scalar lanes give.
+//! The phase runs alone, with all the passes it has in a step. The state it changes is restored every 100
+//! repeats, outside the measured time. Before a scene is timed at a width, 30 steps must be bit-identical to
+//! those with scalar lanes.
 //!
-//! `sweep/<phase>/<scene>/<solver>` are the passes of every solver beside each other, at the widest
-//! native lanes and standard budgets, but four iterations a substep at most, on a state that `soft_step` has settled; all
-//! work of the phase counts. Their throughput is in contacts times passes, so `elem/s` inverts to ns per contact and pass.
+//! `sweep/<phase>/<scene>/<solver>` times the passes of every solver, at the widest native lanes and standard
+//! budgets, but with at most four iterations per substep, on a state settled by `soft_step`. All work of the
+//! phase counts. Throughput is in contacts times passes, so `elem/s` inverts to ns per contact and pass.
 
 mod common;
 
@@ -29,10 +29,10 @@ const PHASES: [Phase; 9] = [
     Phase::Store,
 ];
 
-/// Iterations of a solver per substep.
+/// Most iterations of a solver per substep.
 const FEW: u32 = 4;
 
-/// Repeats after which the state is brought back.
+/// Repeats after which the state is restored.
 const REPEATS: u64 = 100;
 
 fn bench(c: &mut Criterion) {
@@ -57,7 +57,7 @@ fn bench(c: &mut Criterion) {
     }
 }
 
-/// Time that `count` repeats take.
+/// Time of `count` repeats.
 fn repeated(frozen: &mut HeldWorld<'_>, phase: Phase, count: u64) -> Duration {
     let mut spent = Duration::ZERO;
     for done in (0..count).step_by(REPEATS as usize) {
@@ -76,7 +76,7 @@ fn bench_solvers(c: &mut Criterion) {
         world.settings.solver = variant;
         world.settings.parameters = variant.defaults();
         world.settings.budget = variant.budget;
-        // Times are per pass: a few of Newton's iterations tell it as well as a hundred.
+        // Times are per pass, so a few of Newton's iterations are as good as a hundred.
         let iterations = &mut world.settings.budget.velocity_iterations;
         *iterations = (*iterations).min(FEW);
         let contacts = world.counts.contacts as u64;

@@ -1,6 +1,6 @@
 //! Whole steps: `step/<solver>/<scene>/<width>/<substeps>x<velocity iterations>`.
 //!
-//! Before a scene is timed at a width, 30 steps must give the bits that scalar lanes give.
+//! Before a scene is timed at a width, 30 steps must be bit-identical to those with scalar lanes.
 
 mod common;
 

@@ -1,5 +1,5 @@
-//! A 2D rigid-body engine in SIMD lanes, and a laboratory for contact solvers: which solver, how many iterations, how fast,
-//! and how wrong?
+//! A 2D rigid-body engine in SIMD lanes, and a laboratory that compares contact solvers: how many iterations
+//! each needs, how fast it is, and how large its errors are.
 //!
 //! ```
 //! use simpulse::engine::bodies::{BodyDef, ShapeDef};
@@ -15,8 +15,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! **As a library:** start with [`engine`]: how to build for your CPU, which bits are promised, and how to add, move,
-//! query and remove bodies. [`changelog`] lists changes.
+//! **As a library:** start with [`engine`]: how to build for your CPU, which results are bit-identical, and
+//! how to add, move, query and remove bodies. [`changelog`] lists changes.
 //!
 //! # Three layers
 //!
@@ -60,11 +60,12 @@
 //!
 //! # Reading order
 //!
-//! [`engine::world`] is the step. [`engine::solvers::pgs`] explains the method,
-//! [`engine::constraints::kernels::velocity::sweep`] is the kernel that solvers share, built on [`engine::lanes`].
-//! `lab::scenes` has the scenes with their known values, `lab::metrics` measures errors.
+//! [`engine::world`] is the step. [`engine::solvers::pgs`] explains the method.
+//! [`engine::constraints::kernels::velocity::sweep`] is the kernel that solvers share, built on
+//! [`engine::lanes`].
+//! `lab::scenes` has the scenes and their known values. `lab::metrics` measures errors.
 
-// Printing panics where a reader has left: what the program prints goes through `cli::output`.
+// `println!` panics if the reader of the pipe is gone, so the program prints through `cli::output`.
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 #[doc(inline)]
@@ -80,7 +81,7 @@ pub mod cli;
 #[doc = include_str!("CHANGELOG.md")]
 pub mod changelog {}
 
-/// The README's program runs.
+/// Runs the README's program as a doctest.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

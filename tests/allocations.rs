@@ -8,14 +8,14 @@ use simpulse::engine::world::Settings;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-/// The system's allocator, counting what the current thread asks of it.
+/// The system allocator, with a count of the current thread's allocations.
 struct Counting;
 
 thread_local! {
     static COUNT: Cell<usize> = const { Cell::new(0) };
 }
 
-// SAFETY: every call is handed to the system's allocator unchanged.
+// SAFETY: every call is passed to the system allocator unchanged.
 #[allow(unsafe_code, reason = "an allocator")]
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
@@ -51,13 +51,13 @@ fn a_steady_step_allocates_nothing() {
             if !variant.promises(Law::NoAllocation) {
                 continue;
             }
-            // Without friction a pyramid flows apart: no step of it is steady.
+            // Without friction a pyramid flows apart, so none of its steps is steady.
             if (name, variant.name) == ("pyramid:10", "projection") {
                 continue;
             }
             let mut world = common::run(&common::scene(name), common::settings(variant), 120);
-            // Frozen steps search their pairs each time, moving ones only when bodies left
-            // their bounds: both ways are to be free of allocations.
+            // Frozen steps search their pairs every time. Moving steps search only when bodies leave their
+            // bounds. Neither may allocate.
             world.frozen_step();
             let count = allocations(|| {
                 for _ in 0..10 {

@@ -1,4 +1,4 @@
-//! The program as a user meets it: what it refuses, and what a small study leaves behind.
+//! The program from the user's point of view: what it rejects, and what a small study produces.
 
 use simpulse::engine::solvers::VARIANTS;
 use simpulse::lab::report::study_file::StudyFile;
@@ -15,7 +15,7 @@ fn text(bytes: &[u8]) -> &str {
     std::str::from_utf8(bytes).unwrap()
 }
 
-/// What was written to standard error, without the line on a build that does not use the CPU's lanes.
+/// Standard error without the line that warns of a build that does not use the CPU's lanes.
 fn errors(output: &Output) -> String {
     let lines = text(&output.stderr).lines().filter(|line| !line.starts_with("this CPU has "));
     lines.map(|line| format!("{line}\n")).collect()
@@ -30,14 +30,14 @@ fn entries(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Whether `word` stands in `text` as a number would: `nan`, but not in `dominant`.
+/// Whether `word` occurs in `text` as a separate word: `nan` on its own, but not in `dominant`.
 fn has_word(text: &str, word: &str) -> bool {
     let lower = text.to_lowercase();
     lower.split(|c: char| !c.is_ascii_alphanumeric()).any(|part| part == word)
 }
 
-/// Exit code 2, one line on standard error that begins with `error:` and contains `parts`,
-/// nothing on standard output, and no new file.
+/// Checks for exit code 2, one line on standard error that begins with `error:` and contains `parts`, no
+/// standard output, and no new file.
 fn refused(folder: &Path, args: &[&str], parts: &[&str]) {
     let before = entries(folder);
     let output = simpulse(folder, args);
@@ -177,7 +177,7 @@ fn bad_scene_files_are_refused_with_their_place() {
 fn a_folder_that_cannot_be_written_is_refused_before_the_study() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("taken"), "").unwrap();
-    // The default study would take much longer than this test may.
+    // The default study would take much longer than this test is allowed to.
     refused(folder.path(), &["study", "--out", "taken"], &["taken"]);
     refused(folder.path(), &["study", "--out", "taken/below"], &["taken"]);
 }
@@ -237,8 +237,8 @@ fn a_small_study_leaves_whole_files() {
     let header = reader.headers().unwrap().clone();
     let column = |name: &str| header.iter().position(|h| h == name).unwrap();
     let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
-    // Two scenes, of which one bounces and runs with waves of impacts, too; × all solvers of the default list
-    // × 3 budgets × (natural order and 2 widths).
+    // Two scenes, one of which bounces and also runs with waves of impacts; × all solvers of the default
+    // list × 3 budgets × (natural order and 2 widths).
     assert_eq!(rows.len(), 3 * DEFAULT_SOLVERS.len() * 3 * 3);
     for row in &rows {
         for name in [
@@ -275,12 +275,12 @@ fn a_small_study_leaves_whole_files() {
     let answer = text(&output.stdout);
     assert!(answer.contains("The cheapest setting that is good enough") && answer.lines().count() <= 60);
 
-    // From the records alone comes the answer that was printed.
+    // The printed answer follows from the records alone.
     let study = StudyFile::read(&out).unwrap();
     assert!(answer.starts_with(&answer::text(&study.records, &study.environment, Some(40))), "{answer}");
 }
 
-/// The same answer within a page for the default study, whatever the number of solvers.
+/// The answer fits on one page for the default study too, whatever the number of solvers.
 #[test]
 fn the_answer_comes_first_and_fills_a_page_at_most() {
     let folder = tempfile::tempdir().unwrap();
@@ -316,7 +316,7 @@ fn a_sweep_leaves_a_curve_per_solver() {
     let study = StudyFile::read(&out).unwrap();
     let values: Vec<f64> = study.records.iter().filter_map(|r| Some(r.swept?.value)).collect();
     assert_eq!(values, [15.0, 15.0, 30.0, 30.0, 60.0, 60.0]);
-    // A softer contact gives way more.
+    // A softer contact sags more.
     let depth = |i: usize| study.records[i].errors.unwrap().penetration_max;
     assert!(depth(0) > depth(2), "{} {}", depth(0), depth(2));
 
@@ -328,7 +328,7 @@ fn a_sweep_leaves_a_curve_per_solver() {
     let runs: Vec<(f64, u64)> = study.records.iter().map(|r| (r.dt, r.errors.unwrap().steps)).collect();
     assert_eq!(runs, [(0.01, 500), (0.02, 250)]);
 
-    // The same sweep again has the same errors.
+    // Repeating the sweep gives the same errors.
     let compared = simpulse(folder.path(), &["compare", "o", "o", "--json"]);
     let compared: serde_json::Value = serde_json::from_slice(&compared.stdout).unwrap();
     assert_eq!(compared["pairs"].as_array().unwrap().len(), 6);
@@ -427,8 +427,8 @@ fn shells_complete_options_and_their_values() {
     }
 }
 
-/// A disc of 1 kg hinged to the world at its center, with a motor that is too weak for its speed; another that hangs on a slack
-/// spring; and two bodies that do not collide.
+/// A disc of 1 kg hinged to the world at its center, with a motor too weak for its target speed; another disc
+/// on a slack spring; and two bodies that do not collide.
 const MACHINE: &str = r#"{"name":"machine","bodies":[
     {"type":"static","position":[0,0],"shapes":[{"circle":{"radius":0.1}}]},
     {"type":"dynamic","position":[0,0],"shapes":[{"circle":{"radius":1},"density":0.3183098861837907}]},
@@ -480,7 +480,8 @@ fn a_run_writes_what_its_joints_bear() {
         assert!((found - expected).abs() < 1e-4 * expected.abs() + 1e-6, "{name}: {found} is not {expected}");
     };
     let dt = 1.0 / 60.0;
-    // 1 kg under 10 m/s², above its break load; the motor gives all it has, and turns the disc of ½ kg·m².
+    // 1 kg under 10 m/s², above the break load. The motor gives its maximum torque and turns the disc of
+    // ½ kg·m².
     close("rigid_1", 0.0);
     close("rigid_2", 10.0 * dt);
     close("motor", 0.25 * dt);
@@ -494,7 +495,7 @@ fn a_run_writes_what_its_joints_bear() {
         assert_eq!(at(hinge, none), None, "{none}");
     }
     assert_eq!(hinge.last(), Some(&"true"));
-    // A spring without stiffness bears nothing, and its anchors part by the way of the fall.
+    // A spring without stiffness carries no load, and its anchors separate by the distance of the fall.
     let spring = line("4", "1");
     assert_eq!(
         (at(spring, "spring_1"), at(spring, "force"), spring.last()),
@@ -515,7 +516,7 @@ fn a_run_writes_its_columns_at_the_steps_asked_for() {
     for phase in ["pairs", "collide", "prepare", "solve", "relax", "integrate", "store", "penetration"] {
         assert!(text(&all.stdout).contains(phase), "{phase}");
     }
-    // Without --all, eight figures in three groups.
+    // Without --all: eight figures in three groups.
     let figures = text(&output.stdout).lines().filter(|line| line.starts_with("  ")).count();
     assert_eq!(figures, 8, "{}", text(&output.stdout));
     let state = std::fs::read_to_string(folder.path().join("s.csv")).unwrap();
@@ -534,8 +535,8 @@ fn a_run_writes_its_columns_at_the_steps_asked_for() {
     let rows: Vec<Vec<f64>> = lines.map(|l| l.split(',').map(|c| c.parse().unwrap()).collect()).collect();
     // Two points under each of three boxes, at two steps.
     assert_eq!(rows.len(), 2 * 3 * 2);
-    // The ground carries three boxes of 10 N for 1/60 s; the columns settle by millimeters,
-    // which moves the load by less than a tenth.
+    // The ground carries three boxes of 10 N for 1/60 s. The columns settle by millimeters, which changes the
+    // load by less than a tenth.
     let ground: f64 = rows.iter().filter(|r| r[0] == 20.0 && r[1] == 0.0).map(|r| r[9]).sum();
     assert!((ground - 0.5).abs() < 0.05, "{ground}");
     // The points under the lowest box are its corners, on the ground.
@@ -559,7 +560,7 @@ fn lists_and_scenes_are_printed() {
     let scenes = simpulse(folder.path(), &["scenes"]);
     assert_eq!(text(&scenes.stdout).lines().count(), simpulse::lab::scenes::CATALOG.len());
 
-    // A scene that is printed can be read, and is the same when it is printed again.
+    // A printed scene can be read, and prints the same text again.
     let printed = simpulse(folder.path(), &["scene", "card_house", "--json"]).stdout;
     std::fs::write(folder.path().join("house.json"), &printed).unwrap();
     assert_eq!(simpulse(folder.path(), &["scene", "house.json", "--json"]).stdout, printed);
@@ -575,7 +576,7 @@ fn the_default_study_names_scenes_that_exist() {
     simpulse::lab::study::StudyPlan::quick().check().unwrap();
 }
 
-/// Every command that README and papers print, as words; what a shell does with them is left out.
+/// Every command in the README and the papers, as words, without shell syntax.
 fn printed_commands() -> Vec<(String, Vec<String>)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut files = vec![root.join("README.md")];
@@ -612,7 +613,7 @@ fn every_command_in_readme_and_papers_is_one() {
     let commands = printed_commands();
     assert!(commands.len() > 30, "{}", commands.len());
     for (place, words) in commands {
-        // `NAME` stands for a name, and prose may speak of a command without what it needs.
+        // `NAME` is a placeholder. Prose may mention a command without its required arguments.
         let is_prose = words.len() == 1 && words[0].chars().all(|c| c.is_ascii_lowercase());
         let words = words.iter().map(|w| if w == "NAME" { "arch" } else { w.as_str() });
         let words: Vec<&str> = std::iter::once("simpulse").chain(words).collect();
@@ -642,7 +643,7 @@ fn a_scene_that_was_printed_falls_as_its_own_does() {
     assert!(own["holds"] == "fell" && own["failed_step"].as_u64() > Some(1), "{}", own["holds"]);
     assert_eq!(own["bits_equal"], true);
     assert_eq!(own["impacts"], "own");
-    // Where a file says nothing, the answer says that nothing was checked.
+    // If a file states no conditions, the answer states that nothing was checked.
     let bare =
         r#"{"name":"b","bodies":[{"type":"dynamic","position":[0,0],"shapes":[{"circle":{"radius":1}}]}]}"#;
     std::fs::write(folder.path().join("bare.json"), bare).unwrap();
@@ -661,7 +662,7 @@ fn what_a_solver_ignores_is_refused_with_who_has_it() {
     refused(folder.path(), &relax, &["--relax-iterations", "pgs", "soft_step"]);
     let hertz = ["run", "stack:2", "--solver", "pgs", "--set", "contact_hertz=60"];
     refused(folder.path(), &hertz, &["contact_hertz", "pgs", "soft_step"]);
-    // Where others have it, a line says who does not.
+    // If some solvers lack the parameter, a line names them.
     let both = ["study", "--quick", "--scenes", "stack:2", "--solvers", "pgs,soft_step", "--lanes", "1"];
     let output = simpulse(folder.path(), &[&both[..], &["--set", "contact_hertz=60"]].concat());
     assert_eq!(errors(&output), "contact_hertz has no effect on pgs\n");
@@ -686,7 +687,7 @@ fn a_part_that_is_missing_and_a_folder_in_use_are_refused() {
     refused(folder.path(), &args, &["whole", "another study"]);
     drop(lock);
 
-    // A folder of an older program is refused with its version.
+    // A folder of an older program version is rejected, and the version is named.
     std::fs::write(folder.path().join("whole/study.json"), r#"{"environment":{"version":"0.0.1"}}"#).unwrap();
     refused(folder.path(), &["report", "whole"], &["schema version 1", "0.0.1"]);
 }

@@ -1,10 +1,10 @@
-//! Law: whatever a file says, reading it ends in a scene or problem that runs, or in an error of
-//! one line. Nothing panics, hangs or takes memory without bound.
+//! Law: reading any file, however malformed, gives a scene or problem that runs, or a one-line error. Nothing
+//! panics, hangs or allocates memory without bound.
 //!
-//! A mutation fuzzer on stable Rust. Without coverage counters, an input is kept as a parent of
-//! others if it fails in words, or succeeds in a way, that was not seen before.
+//! A mutation fuzzer on stable Rust. There are no coverage counters. Instead, an input becomes a parent of
+//! further inputs if its error message, or the way it succeeds, was not seen before.
 //!
-//! A normal run tries a fixed number of inputs, the same each time. A long one looks at the clock:
+//! A normal run tries a fixed number of inputs, the same each time. A long run has a time limit:
 //!
 //! ```text
 //! SIMPULSE_FUZZ_SECONDS=1200 cargo test --release --test fuzz -- --nocapture    # each test
@@ -26,7 +26,7 @@ use rand::RngExt;
 use simpulse::lab::scenes::{self, CATALOG};
 use std::path::Path;
 
-/// Catalog scenes small enough to be parents.
+/// Catalog scenes small enough to serve as parents.
 fn scene_seeds() -> Vec<Vec<u8>> {
     const MOST_BYTES: usize = 6000;
     let small = ["disc_column:3", "stack:2", "pyramid:3", "circle_pile:12"];
@@ -64,7 +64,7 @@ fn frozen_files() {
             3 => follow::payload(&bytes::mutate(random, corpus)).to_vec(),
             _ => values::mutate_frozen(random, corpus),
         };
-        // With a header that fits, the payload is read as well.
+        // With a matching header, the payload is read as well.
         follow::signed(&text)
     }
     let target = Target { name: "frozen_files", seeds: frozen_seeds(), mutate, judge: follow::frozen };

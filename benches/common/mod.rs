@@ -1,4 +1,4 @@
-//! Scenes that the benches share.
+//! Scenes shared by the benches.
 #![allow(dead_code)]
 
 use simpulse::engine::lanes::LaneWidth;
@@ -6,10 +6,10 @@ use simpulse::engine::solvers;
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes;
 
-/// Contacts in second-level cache, and in third-level cache.
+/// Scenes whose contacts fit in the second-level cache and in the third-level cache.
 pub const KERNEL_SCENES: [&str; 2] = ["pyramid:30", "large_pyramid"];
 
-/// Small, middling, and without boxes.
+/// A small scene, a medium one, and one without boxes.
 pub const STEP_SCENES: [&str; 3] = ["stack:20", "pyramid:30", "circle_pile:500"];
 
 /// A scene after 30 steps of `solver` at `width`, with the clock on.
@@ -17,7 +17,7 @@ pub fn settled(scene: &str, solver: &str, width: LaneWidth) -> World {
     stable(scene, solver, width).expect("a stable start")
 }
 
-/// As [`settled`]; none if the solver diverges, as Jacobi iterations on pyramids do.
+/// As [`settled`]; `None` if the solver diverges, as Jacobi iterations on pyramids do.
 pub fn stable(scene: &str, solver: &str, width: LaneWidth) -> Option<World> {
     let mut settings = Settings::new(solvers::find(solver).expect("a solver of the table")).exactly(width);
     settings.timed = true;

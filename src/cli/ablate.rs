@@ -1,4 +1,4 @@
-//! `simpulse ablate`: what each mechanism of a solver is for.
+//! `simpulse ablate`: the effect of leaving out each mechanism of a solver.
 
 use super::output::{note, print, print_json, value};
 use super::progress::Bar;
@@ -14,9 +14,9 @@ use std::process::ExitCode;
 
 /// Leave out each mechanism of a solver in turn, and show what is lost
 ///
-/// A solver names its mechanisms in its row. Each is left out alone. The output lists the hard cases that then
-/// fail and the lines of code of the mechanism. On some scenes it compares overlap, speed at rest and time with
-/// those of the whole solver; both are stepped interleaved.
+/// The entry of a solver lists its mechanisms. Each is left out alone. The output lists the hard cases that
+/// then fail, and the lines of code of the mechanism. On some scenes it compares overlap, speed at rest and
+/// time with those of the whole solver; both are stepped interleaved.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:
@@ -44,7 +44,7 @@ pub struct AblateArgs {
     /// Steps of each scene
     #[arg(long, default_value_t = 300, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub steps: u32,
-    /// Threads; the results but for times do not depend on them
+    /// Threads; results other than times do not depend on them
     #[arg(long, default_value_t = 2, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
     pub threads: u8,
     /// Print JSON instead of text

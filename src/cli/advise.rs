@@ -1,4 +1,4 @@
-//! `simpulse advise`: the cheapest setting that is good enough, with the evidence.
+//! `simpulse advise`: finds the cheapest setting that is good enough, and shows the evidence.
 
 use super::output::{print, print_json};
 use super::progress::Bar;
@@ -145,7 +145,7 @@ pub fn run(args: &AdviseArgs) -> Result<ExitCode, Error> {
     Ok(if advice.best().is_some() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// The command that runs what was chosen.
+/// The command that runs the chosen setting.
 fn repeat(plan: &SearchPlan, advice: &Advice) -> String {
     let Some(chosen) = advice.best().or(advice.nearest()) else { return String::new() };
     let SearchSetting { solver, order, budget, parameters, impacts } = &chosen.setting;
@@ -170,7 +170,7 @@ fn repeat(plan: &SearchPlan, advice: &Advice) -> String {
     format!("\nto run it: {}\n", words.join(" "))
 }
 
-/// A word for a shell.
+/// A word, quoted for a shell if necessary.
 fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-.:/".contains(c);
     match word.chars().all(is_plain) && !word.is_empty() {
@@ -179,7 +179,7 @@ fn quoted(word: &str) -> String {
     }
 }
 
-/// The limits in words.
+/// The limits as text.
 fn limits(plan: &SearchPlan, unit: &str) -> String {
     let l = &plan.limits;
     let parts = [
@@ -230,7 +230,7 @@ fn text(plan: &SearchPlan, advice: &Advice) -> String {
     text
 }
 
-/// The advice: what it costs, and what was seen of it.
+/// The advice: its cost, and its errors.
 fn sentence(plan: &SearchPlan, best: &Trial) -> String {
     let mut text = format!("{}: ", name(best));
     if let Some(time) = best.time {
@@ -254,7 +254,7 @@ fn sentence(plan: &SearchPlan, best: &Trial) -> String {
     text
 }
 
-/// What is faster and was not taken, with the reason.
+/// Settings that are faster but were rejected, with the reason.
 fn rejected(plan: &SearchPlan, advice: &Advice) -> String {
     let mut rows = table(&["  rejected although faster", "µs/step", "longest", "why"]);
     for trial in &advice.rejected {
@@ -266,7 +266,7 @@ fn rejected(plan: &SearchPlan, advice: &Advice) -> String {
     if advice.rejected.is_empty() { String::new() } else { finish(rows, 1) + "\n" }
 }
 
-/// The setting with its lanes.
+/// Name of the setting, with its lanes.
 fn name(trial: &Trial) -> String {
     format!("{}, {}", trial.setting.text(), lanes(trial))
 }
@@ -278,7 +278,7 @@ fn lanes(trial: &Trial) -> String {
     }
 }
 
-/// How far a setting is behind the best one.
+/// How much slower a setting is than the best one.
 fn loses(next: &Trial, best: &Trial) -> String {
     let Some((next_time, best_time)) = next.time.zip(best.time) else { return String::new() };
     let percent = 100.0 * (next_time.mean_ns / best_time.mean_ns - 1.0);
@@ -289,7 +289,7 @@ fn loses(next: &Trial, best: &Trial) -> String {
     }
 }
 
-/// Its time, and all its errors.
+/// Time and errors of a setting.
 fn evidence(trial: &Trial, advice: &Advice) -> String {
     let mut text = String::new();
     if let Some(time) = trial.time {
@@ -311,7 +311,7 @@ fn evidence(trial: &Trial, advice: &Advice) -> String {
     text
 }
 
-/// Everything that was timed, a line each.
+/// All settings of the final timing, one line each.
 fn finalists(plan: &SearchPlan, advice: &Advice) -> String {
     let rests = plan.limits.rest.is_some();
     let mut rows = table(&[

@@ -10,11 +10,12 @@ use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Compare every solver with its source's method, written once more in f64
+/// Compare every solver with an independent f64 implementation of its source's method
 ///
-/// Runs both on three small contact problems for 1 to 10 iterations (solvers with substeps: substeps) from the same start, and
-/// prints the largest distance of velocities, places and impulses. Each departure from the source is taken back alone in f64,
-/// which shows by how much it departs. Exit code 1: a solver is farther from its source than its entry allows.
+/// Runs both on three small contact problems for 1 to 10 iterations (solvers with substeps: substeps) from
+/// the same start, and prints the largest distance of velocities, positions and impulses. Each departure from
+/// the source is undone alone in f64, which shows how much it changes the result. Exit code 1: a solver is
+/// farther from its source than its entry allows.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:

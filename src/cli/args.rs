@@ -54,7 +54,7 @@ pub struct Cli {
     pub study: StudyArgs,
 }
 
-/// What to do.
+/// Commands.
 #[derive(Subcommand, Debug)]
 pub enum Command {
     /// Compare solvers, budgets and lane widths by time and by error
@@ -90,7 +90,7 @@ pub enum Command {
     Completions(CompletionArgs),
 }
 
-/// What lists have in common.
+/// Options common to all list commands.
 #[derive(Args, Debug)]
 pub struct ListArgs {
     /// Print JSON instead of text
@@ -98,7 +98,7 @@ pub struct ListArgs {
     pub json: bool,
 }
 
-/// A shell.
+/// Arguments of `simpulse completions`.
 #[derive(Args, Debug)]
 pub struct CompletionArgs {
     /// Which one

@@ -17,13 +17,12 @@ use std::process::ExitCode;
 
 /// Freeze the contact problem of one step of a scene, joints included
 ///
-/// Runs the scene up to the given step and writes the contact problem that this step is about to solve: masses,
-/// velocities, Jacobians, gaps, friction and warm-start impulses; and the rows of joints with their errors, springs, motors and
-/// bounds. What the simulation stores in f32 is kept to the
-/// last bit. If a reference solution can be found and certified, it is written too; otherwise the problem is written
-/// without one.
+/// Runs the scene up to the given step and writes the contact problem that this step is about to solve:
+/// masses, velocities, Jacobians, gaps, friction and warm-start impulses; and the rows of joints with their
+/// errors, springs, motors and bounds. Values stored in f32 are written exactly. If a reference solution can
+/// be found and certified, it is written too; otherwise the problem is written without one.
 ///
-/// The file is for `simpulse converge`, which runs every solver on exactly this problem.
+/// `simpulse converge` reads the file and runs every solver on exactly this problem.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:
@@ -49,10 +48,10 @@ pub struct CaptureArgs {
     pub json: bool,
 }
 
-/// The problem of step `step` of a scene, with its reference if there is one, and if not, why.
+/// The problem of step `step` of a scene, with its reference solution; if there is none, the reason why.
 ///
-/// Errors: an unknown scene or solver, a file that is no scene, step 0, a run that diverges before
-/// the step, a step without contacts and joints.
+/// Errors: an unknown scene or solver, an invalid scene file, step 0, a run that diverges before the step, a
+/// step without contacts and joints.
 pub fn freeze(name: &str, step: u64, setting: &SettingArgs) -> Result<(Frozen, Option<String>), Error> {
     let mut world = open_scene(name, None, None, None)?.scene.build(setting.settings()?)?;
     let bar = Bar::new();
@@ -71,7 +70,7 @@ pub fn freeze(name: &str, step: u64, setting: &SettingArgs) -> Result<(Frozen, O
     })
 }
 
-/// Contact points, and rows of joints if there are any.
+/// Numbers of contact points and, if there are any, of joint rows.
 fn sizes(problem: &ContactProblem) -> String {
     let points = format!("{} contact points", problem.contacts.len());
     match problem.joint_rows() {

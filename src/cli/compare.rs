@@ -1,4 +1,4 @@
-//! `simpulse compare`: two studies, and what became better or worse.
+//! `simpulse compare`: lists what became better or worse between two studies.
 
 use super::output::{print, print_json, value};
 use crate::lab::compare::{self, CompareOptions};

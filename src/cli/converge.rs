@@ -104,7 +104,7 @@ pub fn run(args: &ConvergeArgs) -> Result<ExitCode, Error> {
         }
         frozen
     };
-    // Before the long wait, not after it.
+    // Fail before the long computation, not after it.
     files::prepare_folder(&args.out)?;
     let bar = Bar::new();
     let tell = |done: usize, parts: usize, what: &str| bar.show(done, parts, what);

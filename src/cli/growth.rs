@@ -1,4 +1,4 @@
-//! `simpulse growth`: the cost of a contact from a thousand contacts to a million.
+//! `simpulse growth`: the cost per contact, from a thousand contacts to a million.
 
 use super::output::{note, print, print_json};
 use super::progress::Bar;
@@ -69,14 +69,14 @@ pub struct GrowthArgs {
 /// Steps at the end of settling whose errors are printed.
 const OBSERVED_STEPS: u32 = 2;
 
-/// Share of the free memory that worlds may take.
+/// Fraction of the free memory that worlds may use.
 const MEMORY_SHARE: f64 = 0.6;
 
-/// A scene that can be had with about so many contacts.
+/// A scene that can be built with a given number of contacts.
 enum GrowthFamily {
-    /// By its size: sizes it can have, and contacts at two of them.
+    /// Built larger. `size`: the allowed sizes; `known`: two sizes, each with its number of contacts.
     Sized { name: String, size: Size, known: [(f64, f64); 2] },
-    /// By copies: the scene and its contacts.
+    /// Copied side by side: the scene and its number of contacts.
     Copied { scene: Scene, contacts: usize },
 }
 
@@ -112,7 +112,7 @@ impl GrowthFamily {
         Ok(GrowthFamily::Sized { name: name.into(), size, known })
     }
 
-    /// The scene nearest to `target` contacts; none if it cannot be that large.
+    /// The scene whose number of contacts is nearest to `target`; `None` if the scene cannot be that large.
     fn scene(&self, target: f64) -> Result<Option<Scene>, Error> {
         let made = match self {
             GrowthFamily::Sized { name, size, known } => {
@@ -134,10 +134,10 @@ impl GrowthFamily {
     }
 }
 
-/// Most contacts of a size.
+/// Largest number of contacts that may be requested.
 const MAX_CONTACTS: f64 = 1e8;
 
-/// Ascending, each once.
+/// The requested numbers of contacts, in ascending order and without duplicates.
 fn targets(texts: &[String]) -> Result<Vec<f64>, Error> {
     let mut targets = Vec::new();
     for text in texts {
@@ -154,14 +154,14 @@ fn targets(texts: &[String]) -> Result<Vec<f64>, Error> {
     Ok(targets)
 }
 
-/// Contacts of a body in a pile of boxes, and memory of a world per contact (B).
+/// Contacts per body in a pile of boxes, and memory of a world per contact (B).
 const CONTACTS_PER_BODY: f64 = 3.0;
 const BYTES_PER_CONTACT: f64 = 1250.0;
 
 /// Steps of one timing run of a size, including those that restore the state.
 const STEPS_PER_REPEAT: u32 = 4;
 
-/// The worlds of all sizes. Sizes that do not fit in memory are skipped, with a message.
+/// Estimate of the whole command. Sizes with too many bodies are left out.
 fn estimate(targets: &[f64], args: &GrowthArgs, settings: &Settings) -> Estimate {
     let possible = |target: &&f64| **target <= CONTACTS_PER_BODY * MAX_BODIES as f64;
     let contacts: f64 = targets.iter().filter(possible).sum();
@@ -177,7 +177,7 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
     let (solver, width) = (args.setting.solver, args.lanes.or_native());
     let settings = args.setting.settings()?.exactly(width);
     let targets = targets(&args.contacts)?;
-    // Unknown names first; a path is read when it is opened.
+    // Report unknown names first. A path is read when it is opened.
     if !is_path(&args.scene) && CATALOG.iter().all(|e| e.name != args.scene) {
         named(&args.scene)?;
     }
@@ -195,7 +195,8 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
             notes += &format!("skipped: {target} contacts is outside what {} can have\n", args.scene);
             continue;
         };
-        // What a contact took so far, what settling takes, and the scene itself.
+        // Twice the memory per contact of the previous world: one part for the world and one for settling and
+        // the scene.
         let bytes =
             |e: &GrowthWorld| 2.0 * e.world.memory().held() as f64 / e.world.counts.contacts.max(1) as f64;
         let expected = entries.last().map_or(0.0, bytes) * target;
@@ -237,7 +238,7 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
     }
 }
 
-/// A scene by name or file, as it is.
+/// The scene of this name or file, unchanged.
 fn named(name: &str) -> Result<Scene, Error> {
     Ok(open_scene(name, None, None, None)?.scene)
 }

@@ -8,7 +8,7 @@ use std::time::Duration;
 /// Exit code of an interrupted command.
 const INTERRUPTED: i32 = 130;
 
-/// How long an interrupted command may go on writing results: so many moments.
+/// An interrupted command may go on writing results for at most this many moments.
 const PATIENCE: u32 = 100;
 const MOMENT: Duration = Duration::from_millis(100);
 
@@ -16,15 +16,17 @@ type Rescue = Box<dyn FnOnce() + Send>;
 
 static RESCUE: Mutex<Option<Rescue>> = Mutex::new(None);
 
-/// From now on a signal runs the last closure given to [`on_interrupt`], removes temporary files and ends the process
-/// with code 130.
+/// After this call, a signal runs the last closure given to [`on_interrupt`], removes temporary files and
+/// ends the process with code 130.
 pub fn install() {
-    // Without a handler (there is one already, or the system has none) signals do what they always do.
+    // If no handler can be installed (there is one already, or the system has none), signals keep their
+    // default action.
     let _ = ctrlc::set_handler(|| {
         if let Some(rescue) = take() {
             rescue();
         }
-        // Whoever writes files that belong together ends that first, and the process with it; but not for ever.
+        // If files that belong together are being written, wait until that is done, but only for a limited
+        // time.
         let mut writing = WRITING.try_lock();
         for _ in 0..PATIENCE {
             if !matches!(writing, Err(TryLockError::WouldBlock)) {
@@ -38,23 +40,24 @@ pub fn install() {
     });
 }
 
-/// What to do when the process is interrupted, until the guard is dropped.
+/// Runs `rescue` if the process is interrupted before the guard is dropped.
 pub fn on_interrupt(rescue: impl FnOnce() + Send + 'static) -> Guard {
     *RESCUE.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(rescue));
     Guard
 }
 
-/// Forgets what [`on_interrupt`] was given.
+/// Unregisters the closure given to [`on_interrupt`] when dropped.
 pub struct Guard;
 
-/// Held while files are written that belong together.
+/// Locked while files that belong together are written.
 static WRITING: Mutex<()> = Mutex::new(());
 
-/// Until it is dropped a signal waits.
+/// Delays signals until it is dropped.
 pub struct Writing(#[allow(dead_code)] MutexGuard<'static, ()>);
 
 impl Guard {
-    /// Stops rescuing partial results: the final ones are being written, and a signal waits for that.
+    /// Stops rescuing partial results: the final ones are being written, and a signal waits until that is
+    /// done.
     pub fn finish(self) -> Writing {
         let writing = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
         drop(self);

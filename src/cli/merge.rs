@@ -51,7 +51,7 @@ pub fn run(args: &MergeArgs) -> Result<ExitCode, Error> {
     }
     files::prepare_folder(&args.out)?;
     let _lock = files::Lock::of(&args.out)?;
-    // Results of another study there.
+    // Remove recordings of another study.
     html::write_recordings(&args.out, &[])?;
     let paths = report::write_study(&args.out, &whole)?;
     if args.json {

@@ -1,7 +1,7 @@
 //! The command line, a file per command: arguments in, files and text out.
 //!
-//! Exit code 0 is success, 1 a simulation that diverged or a comparison that found a regression, 2 a request
-//! that cannot be met, 130 a signal.
+//! Exit code 0 is success, 1 a simulation that diverged or a comparison that found a regression, 2 an invalid
+//! request, 130 a signal.
 
 pub mod ablate;
 pub mod advise;
@@ -47,12 +47,12 @@ use serde_json::{Value, json};
 use std::io::ErrorKind;
 use std::process::ExitCode;
 
-/// Parses the command line, runs the command, reports; see the [module](self) for exit codes.
+/// Parses the command line, runs the command and prints the result. See the [module](self) for exit codes.
 pub fn main() -> ExitCode {
     interrupt::install();
     let result = match Cli::try_parse() {
         Ok(cli) => execute(cli),
-        // Help and version are answers; clap's advice on the rest goes on one line.
+        // Help and version are regular output. For other errors, clap's message is printed on one line.
         Err(error) if !error.use_stderr() => {
             let _ = error.print();
             return ExitCode::SUCCESS;
@@ -103,7 +103,7 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
     }
 }
 
-/// A study; then CPU features that this build does not use.
+/// Runs a study, then lists CPU features that this build does not use.
 fn full_study(args: &study::StudyArgs) -> Result<ExitCode, Error> {
     let code = study::run(args)?;
     if let Some(line) = unused_cpu_features() {
@@ -112,8 +112,8 @@ fn full_study(args: &study::StudyArgs) -> Result<ExitCode, Error> {
     Ok(code)
 }
 
-/// What to say about an option without a value: clap has several messages, and one of them is
-/// about the value ''.
+/// The message for an empty option value; `None` for other errors. clap has several messages for this case,
+/// one of which is about the value ''.
 fn empty(error: &clap::Error) -> Option<String> {
     let text = |kind| match error.get(kind) {
         Some(ContextValue::String(text)) => Some(text.as_str()),
@@ -131,7 +131,7 @@ fn empty(error: &clap::Error) -> Option<String> {
     })
 }
 
-/// A message without its own prefix and without advice on usage, on one line.
+/// A message on one line, without its prefix and without advice on usage.
 fn one_line(message: &str) -> String {
     let message = message.strip_prefix("error: ").unwrap_or(message);
     let message = message.split("\nUsage:").next().unwrap_or(message);
@@ -187,7 +187,8 @@ fn solvers(args: &ListArgs) -> Result<ExitCode, Error> {
     print(&format!("* in the default study; --solvers all runs every solver\n{lines}\n{}", parameters()))
 }
 
-/// The parameters of `--set` and `--sweep`, each with its range and meaning; several lines where solvers differ.
+/// The parameters of `--set` and `--sweep`, each with its range and meaning; several lines for a parameter
+/// that differs between solvers.
 fn parameters() -> String {
     let mut lines: Vec<String> = Vec::new();
     for p in VARIANTS.iter().flat_map(|v| v.parameters) {
@@ -240,7 +241,7 @@ fn scene(args: &SceneArgs) -> Result<String, Error> {
     }
 }
 
-/// A scene in words.
+/// Description of a scene, as text.
 fn described(scene: &Description) -> String {
     let [gx, gy] = scene.gravity;
     let mut text = format!(
@@ -278,7 +279,7 @@ fn described(scene: &Description) -> String {
     text
 }
 
-/// Runs `steps` steps; the errors of the last `observed` of them, none without steps.
+/// Runs `steps` steps. Returns the errors of the last `observed` of them; `None` without steps.
 fn settled(world: &mut World, steps: u32, observed: u32) -> Result<Option<Errors>, Error> {
     let mut observation = None;
     for step in 0..steps {

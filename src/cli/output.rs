@@ -7,7 +7,7 @@ use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
-/// An answer, to standard output.
+/// Prints an answer to standard output.
 pub fn print(text: &str) -> Result<ExitCode, Error> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
@@ -16,7 +16,7 @@ pub fn print(text: &str) -> Result<ExitCode, Error> {
     }
 }
 
-/// An answer printed in addition to files: to standard error if one of the files is standard output.
+/// Prints an answer in addition to files: to standard error if one of the files is standard output.
 pub fn print_beside<'a>(files: impl IntoIterator<Item = &'a Path>, text: &str) -> Result<ExitCode, Error> {
     if files.into_iter().any(is_standard_output) {
         note(text);
@@ -25,22 +25,22 @@ pub fn print_beside<'a>(files: impl IntoIterator<Item = &'a Path>, text: &str) -
     print(text)
 }
 
-/// Notes and errors, to standard error; write failures are ignored.
+/// Prints notes and errors to standard error; write failures are ignored.
 pub fn note(text: &str) {
     let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }
 
-/// The same as JSON. Non-finite numbers become words: [`finite`].
+/// Prints an answer as JSON. Convert numbers that may not be finite with [`finite`].
 pub fn print_json(value: &Value) -> Result<ExitCode, Error> {
     print(&format!("{value:#}\n"))
 }
 
-/// Anything that can be serialized.
+/// JSON value of anything that can be serialized.
 pub fn value(of: &impl serde::Serialize) -> Result<Value, Error> {
     serde_json::to_value(of).map_err(|e| Error::invalid("json", e.to_string()))
 }
 
-/// JSON has no infinities: they are words.
+/// A number as JSON; a non-finite number, which JSON does not have, becomes a word.
 pub fn finite(number: f64) -> Value {
     if number.is_finite() { number.into() } else { number.to_string().into() }
 }

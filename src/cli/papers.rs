@@ -1,4 +1,4 @@
-//! `simpulse papers`: the claims of the sources, measured again.
+//! `simpulse papers`: re-measures the claims of the sources.
 
 use super::output::{note, print, print_json};
 use crate::lab::error::Error;
@@ -34,7 +34,7 @@ pub struct PapersArgs {
     pub json: bool,
 }
 
-/// Column of the figure that was printed last.
+/// Column of the last printed figure.
 const PRINTED: usize = 4;
 
 /// A row of the table: claim, command, figure, expected, printed, verdict.
@@ -47,7 +47,7 @@ struct ClaimRow<'a> {
 }
 
 impl<'a> ClaimRow<'a> {
-    /// None for lines that are not rows of the table. Errors: a range that cannot be read.
+    /// `None` for lines that are not rows of the table. Errors: a range that cannot be parsed.
     fn parse(line: usize, text: &'a str) -> Result<Option<Self>, Error> {
         let Some(inner) = text.strip_prefix("| ").and_then(|text| text.strip_suffix(" |")) else {
             return Ok(None);
@@ -69,12 +69,13 @@ impl<'a> ClaimRow<'a> {
     }
 }
 
-/// What is between backticks.
+/// The text between backticks.
 fn code(cell: &str) -> Option<&str> {
     cell.strip_prefix('`')?.strip_suffix('`')
 }
 
-/// The value at a path of keys, places in lists, and `key=value,…`, which finds the first entry of a list with these values.
+/// The value at a path of keys, list indices, and `key=value,…`, which selects the first entry of a list with
+/// these values.
 fn at<'v>(mut value: &'v Value, path: &str) -> Option<&'v Value> {
     for step in path.split('/') {
         value = match value {
@@ -95,21 +96,21 @@ fn at<'v>(mut value: &'v Value, path: &str) -> Option<&'v Value> {
     Some(value)
 }
 
-/// Runs a command of this program and reads its JSON. Errors: another program, no JSON.
+/// Runs a command of this program and parses its JSON. Errors: another program, no JSON.
 fn run_command(command: &str) -> Result<Value, Error> {
     let words: Vec<&str> = command.split_whitespace().collect();
     let ["simpulse", arguments @ ..] = &words[..] else {
         return Err(Error::invalid("command", format!("'{command}' does not begin with 'simpulse'")));
     };
     let program = std::env::current_exe().map_err(Error::io("the program itself"))?;
-    // A run whose scene does not hold has an exit code of its own and still prints its figures.
+    // A run whose scene does not hold has a non-zero exit code but still prints its figures.
     let output = Command::new(program).args(arguments).arg("--json").output().map_err(Error::io(command))?;
     let told = String::from_utf8_lossy(&output.stderr);
     serde_json::from_slice(&output.stdout)
         .map_err(|_| Error::invalid(command, format!("printed no JSON; {told}")))
 }
 
-/// Four digits.
+/// A number with four digits.
 fn digits(value: f64) -> String {
     match value.abs() {
         0.0 => "0".into(),

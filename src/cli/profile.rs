@@ -79,20 +79,20 @@ pub struct ProfileArgs {
 /// Steps at the end of settling whose errors are printed.
 const OBSERVED_STEPS: u32 = 10;
 
-/// Longest measurement (s).
+/// Longest allowed measurement (s).
 const MAX_SECONDS: f64 = 86_400.0;
 
-/// Names of all phases, as `--phase` takes them.
+/// Names of all phases, as `--phase` accepts them.
 fn names(phases: impl Iterator<Item = Phase>) -> String {
     phases.map(key).chain(["all".to_string()]).collect::<Vec<_>>().join(", ")
 }
 
-/// `warm-start` for the phase that tables call `warm start`.
+/// Name of a phase on the command line: `warm-start` for the phase that tables call `warm start`.
 fn key(phase: Phase) -> String {
     phase.name().replace(' ', "-")
 }
 
-/// What to repeat.
+/// Which phases to repeat.
 #[derive(Clone, Copy, Debug)]
 pub enum Which {
     /// Every phase, in turn.
@@ -128,7 +128,7 @@ pub fn run(args: &ProfileArgs) -> Result<ExitCode, Error> {
     }
     let settings = settings(args)?;
     let scene = open_scene(&args.scene, args.seed, None, None)?.scene;
-    // Before the long wait, not after it.
+    // Fail before the long measurement, not after it.
     let file = args.roofline.as_deref().map(Pending::new).transpose()?;
     note(&format!("settling {}: {} steps\n", scene.name, args.settle));
     let mut world = scene.build(settings)?;

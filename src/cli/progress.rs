@@ -1,4 +1,4 @@
-//! Progress of long work, on standard error, where that is a terminal.
+//! Progress of long work, on standard error if it is a terminal.
 
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -12,7 +12,7 @@ impl Default for Bar {
 }
 
 impl Bar {
-    /// Nothing is drawn before the first call of [`Bar::show`], nor when standard error is not a terminal.
+    /// Nothing is drawn before the first call of [`Bar::show`], or if standard error is not a terminal.
     pub fn new() -> Self {
         let bar = ProgressBar::new(1);
         let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {elapsed} {wide_msg}");
@@ -20,14 +20,15 @@ impl Bar {
         Bar(bar)
     }
 
-    /// As `show`, for one of many short steps: updated every hundred steps, so that it costs nothing.
+    /// As `show`, for many short steps: it redraws only every hundredth of the total, so that its cost is
+    /// negligible.
     pub fn step(&self, done: usize, total: usize, what: &str) {
         if done.is_multiple_of(total.div_ceil(100)) {
             self.show(done, total, what);
         }
     }
 
-    /// Sets the work done so far and the name of what runs.
+    /// Sets the finished part of the work and the name of the current part.
     pub fn show(&self, done: usize, total: usize, what: impl Into<String>) {
         self.0.set_length(total as u64);
         self.0.set_position(done as u64);

@@ -1,4 +1,4 @@
-//! `simpulse report`: the page of a study, from its records.
+//! `simpulse report`: rebuilds the page of a study from its records.
 
 use super::output::print;
 use crate::lab::error::Error;

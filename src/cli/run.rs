@@ -93,18 +93,18 @@ pub struct RunArgs {
     pub json: bool,
 }
 
-/// What a run found.
+/// Result of a run.
 struct RunResult {
     times: Times,
     errors: Errors,
     truth: Option<TruthError>,
     broken: Option<Broken>,
     unchecked: Vec<String>,
-    /// Whether the scene has to rest.
+    /// Whether the scene must come to rest.
     rests: bool,
 }
 
-/// A line on bodies that are far from the length unit.
+/// A note about bodies whose size is far from the length unit.
 fn size_note(world: &World) -> Option<String> {
     let dynamic = |pair: &(_, &u32)| world.bodies.is_dynamic(*pair.1 as usize);
     let shapes = world.shapes.iter().zip(&world.shape_body).filter(dynamic);
@@ -118,7 +118,7 @@ fn size_note(world: &World) -> Option<String> {
     })
 }
 
-/// Runs the scene; writes its files once all of it has run.
+/// Runs the scene. Its files are written after the whole run.
 pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let settings = settings(&args.setting, args.order, args.lanes)?;
     let settings = Settings { continuous: args.continuous.unwrap_or(settings.continuous), ..settings };
@@ -209,7 +209,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         }
     }
     drop(bar);
-    // Metrics evict the caches, so times come from separate runs; equal bits show that they are the same run.
+    // Metrics evict the caches, so times come from separate runs. Equal bits show that these did the same
+    // work.
     let own = Settings { record_impulses: false, ..world.settings.clone() };
     let times = Times::measure(scene, own, world.state_hash())?;
     let truth = loaded.truth.as_ref().map(TruthError::of);
@@ -235,7 +236,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     print_beside(files.into_iter().map(|(_, file)| file), &(text + &written))
 }
 
-/// Estimate of the run: one pass for errors, others for times.
+/// Estimate of the command: one pass for errors, others for times.
 fn estimate(scene: &Scene, settings: &Settings) -> Estimate {
     let bodies = scene.bodies.len();
     let step = estimate::step(bodies, sweeps(&settings.budget, settings.solver), settings.width.lanes());
@@ -243,8 +244,7 @@ fn estimate(scene: &Scene, settings: &Settings) -> Estimate {
     Estimate { seconds, bytes: estimate::memory(bodies, 0, 1) }
 }
 
-/// What the world needs. Errors: impossible budgets, parameters out of their range, natural order in
-/// lanes.
+/// Settings of the world. Errors: an impossible budget, a parameter out of its range, natural order in lanes.
 pub fn settings(setting: &SettingArgs, order: Order, lanes: Option<LaneWidth>) -> Result<Settings, Error> {
     let own = setting.settings()?;
     let own = match (order, lanes) {
@@ -266,15 +266,15 @@ impl RunResult {
     /// |---|---|
     /// | time of a step | whether the budget can be afforded at all |
     /// | longest phase | whether fewer sweeps, more lanes or another broad phase would help |
-    /// | greatest penetration | more substeps or stiffer contacts: overlap is what people see |
-    /// | contact-law residual | more sweeps: loads and friction are no better than this |
+    /// | maximum penetration | more substeps or stiffer contacts: overlap is the visible error |
+    /// | contact-law residual | more sweeps: loads and friction are no more accurate than this |
     /// | distance to reference value | another solver: a small residual of the wrong law is still wrong |
     /// | holds | if it does not, no other figure matters |
     /// | residual speed | whether bodies could sleep, or jitter |
     /// | energy change | damping: a gain ends in an explosion, a loss looks viscous |
     ///
-    /// All others (mean and percentiles of penetration, parts of the residual, momentum, creep, counts) explain one
-    /// of these: `--all`.
+    /// `--all` prints the others, each of which explains one of these: mean and percentiles of penetration,
+    /// parts of the residual, momentum, creep, counts.
     fn figures(&self) -> String {
         let e = &self.errors;
         let line = |name: &str, value: String, note: String| {
@@ -364,7 +364,7 @@ fn everything(world: &World, found: &RunResult) -> String {
     }
 }
 
-/// Everything that a run measured, and what was run.
+/// Everything that a run measured, and its settings.
 fn json(world: &World, scene: &Scene, found: &RunResult) -> Result<Value, Error> {
     let s = &world.settings;
     let phases: serde_json::Map<String, Value> =
@@ -400,7 +400,7 @@ fn json(world: &World, scene: &Scene, found: &RunResult) -> Result<Value, Error>
     }))
 }
 
-/// Budget and order or lanes.
+/// Budget, and order or lanes, as text.
 fn how(world: &World) -> String {
     let s = &world.settings;
     let order = match s.order {
@@ -450,7 +450,7 @@ fn truth_line(truth: &TruthError) -> String {
     }
 }
 
-/// A CSV file that appears once it is complete.
+/// A CSV file that appears under its name only when it is complete.
 struct CsvFile {
     writer: csv::Writer<Pending>,
     path: String,
@@ -475,7 +475,8 @@ impl CsvFile {
     }
 }
 
-/// A line per body: origin, angle with all turns since the start, velocity of the center of mass.
+/// Writes a line per body: origin, angle including whole turns since the start, velocity of the center of
+/// mass.
 fn write_state(sheet: &mut CsvFile, world: &World, angles: &Angles, dt: f64) -> Result<(), Error> {
     let time = world.step_index as f64 * dt;
     for i in 0..world.bodies.len() {
@@ -487,8 +488,8 @@ fn write_state(sheet: &mut CsvFile, world: &World, angles: &Angles, dt: f64) -> 
     Ok(())
 }
 
-/// A line per contact point: geometry at the start of the step, where the centers of mass
-/// were at `starts`; impulses on body b over the step.
+/// Writes a line per contact point: geometry at the start of the step, when the centers of mass were at
+/// `starts`, and the impulses on body b over the step.
 fn write_contacts(sheet: &mut CsvFile, world: &World, starts: &[glam::Vec2]) -> Result<(), Error> {
     for contact in &world.contacts {
         let normal = contact.manifold.normal;
@@ -502,10 +503,11 @@ fn write_contacts(sheet: &mut CsvFile, world: &World, starts: &[glam::Vec2]) -> 
     Ok(())
 }
 
-/// Places of impulses in a line: along lines and of the angle, rigid and of springs; then motor and limits.
+/// Impulse columns of a joint: rigid rows (two along lines, one of the angle), spring rows likewise, motor,
+/// two limits.
 const ROWS_OF_LINE: usize = 9;
 
-/// A line per joint.
+/// Writes a line per joint.
 fn write_joints(sheet: &mut CsvFile, world: &World) -> Result<(), Error> {
     let mut lines: BTreeMap<usize, [Option<f32>; ROWS_OF_LINE]> = BTreeMap::new();
     for SolvedBlock { joint, block, step_impulses } in world.solved_blocks() {
@@ -519,7 +521,7 @@ fn write_joints(sheet: &mut CsvFile, world: &World) -> Result<(), Error> {
                 RowLaw::Motor { .. } => 6,
                 RowLaw::Limit => 7,
             };
-            // The second row along a line, the upper limit.
+            // The next column, for the second row along a line or for the upper limit.
             place += usize::from(impulses[place].is_some());
             impulses[place] = Some(impulse);
         }

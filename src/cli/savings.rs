@@ -1,4 +1,4 @@
-//! `simpulse savings`: what kernels gain from specialization.
+//! `simpulse savings`: measures what kernels gain from specialization.
 
 use super::output::{print, print_json, value};
 use super::progress::Bar;

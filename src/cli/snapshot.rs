@@ -1,4 +1,4 @@
-//! `simpulse snapshot`: one frame of a scene as a picture.
+//! `simpulse snapshot`: draws one frame of a scene.
 
 use super::output::print_beside;
 use super::run::settings;
@@ -59,7 +59,7 @@ pub struct SnapshotArgs {
     pub seed: Option<u64>,
 }
 
-/// The format that a file name means.
+/// The encoder for a file name.
 fn encoder(path: &Path) -> Result<fn(&Picture) -> Vec<u8>, Error> {
     if is_standard_output(path) {
         return Ok(|picture| svg::svg(picture).into_bytes());

@@ -26,7 +26,7 @@ use std::process::ExitCode;
 use std::str::FromStr;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Below the help.
+/// Examples printed below the help.
 pub const EXAMPLES: &str = "\
 Without budget options, a solver runs on each scene of the default study at up to three settings.
 They come from a search by errors, with the same rule and effort for all solvers (--thorough
@@ -124,11 +124,11 @@ pub struct StudyArgs {
 }
 
 impl StudyArgs {
-    /// The plan of these arguments. Errors: unknown names, widths that do not exist.
+    /// The plan for these arguments. Errors: unknown names, invalid widths.
     pub fn plan(&self) -> Result<StudyPlan, Error> {
         let mut base = if self.quick { StudyPlan::quick() } else { StudyPlan::default() };
         if self.sweep.is_some() {
-            // A curve per solver.
+            // A sweep draws one curve per solver, so it needs one width and one order.
             (base.widths, base.orders) = (vec![native_width()], vec![Order::Colored]);
         }
         let or = |given: &[String], own: Vec<String>| if given.is_empty() { own } else { unique(given) };
@@ -160,7 +160,7 @@ impl StudyArgs {
     }
 }
 
-/// Tolerances from `NAME=VALUE`. Errors: an unknown name, a value that cannot be a limit.
+/// Tolerances from `NAME=VALUE`. Errors: an unknown name, a value that is not a valid limit.
 fn tolerances(given: &[String]) -> Result<GivenTolerances, Error> {
     let mut tolerances = GivenTolerances::default();
     for text in given {
@@ -181,7 +181,7 @@ fn tolerances(given: &[String]) -> Result<GivenTolerances, Error> {
     Ok(tolerances)
 }
 
-/// Each value once, in the order given.
+/// The values without duplicates, in the order given.
 fn unique<T: PartialEq + Clone>(values: &[T]) -> Vec<T> {
     let mut kept: Vec<T> = Vec::new();
     for value in values {
@@ -192,10 +192,10 @@ fn unique<T: PartialEq + Clone>(values: &[T]) -> Vec<T> {
     kept
 }
 
-/// One of several equal parts of a study: whole scenes, so that times of a scene come from one machine.
+/// A part of a study. It consists of whole scenes, so that all times of a scene come from one machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// From 1.
+    /// Counted from 1.
     index: usize,
     count: usize,
 }
@@ -212,7 +212,7 @@ impl FromStr for Shard {
 }
 
 impl Shard {
-    /// The scenes of this part, and all others. Errors: a part without scenes.
+    /// The scenes of this part, and those of the others. Errors: a part without scenes.
     fn split(self, scenes: Vec<String>) -> Result<(Vec<String>, Vec<String>), Error> {
         let total = scenes.len();
         let (own, others): (Vec<_>, Vec<_>) =
@@ -240,7 +240,7 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     plan.check()?;
     let cost = study::cost::estimate(&plan)?.note("study", free_memory())?;
     let not_held: String = plan.not_held()?.iter().map(|line| format!("skipped: {line}\n")).collect();
-    // Before the long wait, not after it.
+    // Fail before the long computation, not after it.
     files::prepare_folder(&args.out)?;
     let lock = files::Lock::of(&args.out)?;
     note(&(without + &overrides::partly(&plan.solvers, &plan.overrides) + &not_held + &cost));
@@ -266,7 +266,7 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     drop(bar);
     let study = StudyFile::new(&plan, records, elsewhere);
     let replays = telling::recordings(&plan, &study.records)?;
-    // From here on files of an earlier study are replaced; a signal waits until that is complete.
+    // Files of an earlier study are now replaced. A signal waits until that is complete.
     let guard = guard.finish();
     let replays = html::write_recordings(&args.out, &replays)?;
     let mut paths = report::write_study(&args.out, &study)?;
@@ -279,11 +279,11 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     print(&text(&study, plan.steps, &args.out, &paths, args.verbose))
 }
 
-/// Skips solvers that do not have the swept quantity, with a message.
+/// Drops solvers that do not have the swept quantity, and returns a message about them.
 fn keep_concerned(sweep: &QuantitySweep, solvers: &mut Vec<&'static Variant>) -> String {
     let (own, others): (Vec<_>, Vec<_>) = solvers.iter().copied().partition(|v| sweep.concerns(v));
     if own.is_empty() {
-        // The check names those that have it.
+        // Validation reports which solvers have it.
         return String::new();
     }
     *solvers = own;
@@ -294,7 +294,7 @@ fn keep_concerned(sweep: &QuantitySweep, solvers: &mut Vec<&'static Variant>) ->
     }
 }
 
-/// The answer, or the curves of a sweep, and where the files are.
+/// The answer or, for a sweep, its curves as text; then the list of written files.
 pub fn text(study: &StudyFile, steps: Option<u32>, out: &Path, paths: &[PathBuf], verbose: bool) -> String {
     let answer = match sweep::is_sweep(&study.records) {
         true => sweep::text(&study.records, &study.environment),
@@ -313,14 +313,14 @@ pub fn text(study: &StudyFile, steps: Option<u32>, out: &Path, paths: &[PathBuf]
     text
 }
 
-/// Writes the scenes that are finished when the study is interrupted; says so.
+/// Writes the finished scenes of an interrupted study; returns a message.
 fn keep(plan: &StudyPlan, out: &Path, records: Vec<Record>, elsewhere: Vec<String>) -> String {
     let done = records.chunk_by(|a, b| a.scene == b.scene).count();
     let all = plan.scenes.len();
     if done == 0 {
         return format!("interrupted before the first of {all} scenes was finished; nothing written\n");
     }
-    // Scenes are finished in the order of the plan.
+    // Scenes are run in the order of the plan.
     let missing = plan.scenes[done.min(all)..].iter().cloned().chain(elsewhere).collect();
     // Existing recordings belong to another study.
     if let Err(error) = html::write_recordings(out, &[]) {

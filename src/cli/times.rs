@@ -1,4 +1,4 @@
-//! The times of a run, apart from its errors.
+//! The times of a run, measured separately from its errors.
 
 use crate::engine::clock::Phase;
 use crate::engine::world::{Settings, World};
@@ -9,22 +9,22 @@ use crate::lab::study::sample::{Sample, median};
 use crate::lab::units::{digits, si};
 use std::time::{Duration, Instant};
 
-/// Passes over the run, and the total time above which fewer are made.
+/// Passes over the run; one pass if they would take longer than `PATIENCE`.
 const PASSES: u32 = 3;
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Times of every step.
+/// Times of the steps of a run.
 pub struct Times {
-    /// Of steps, timed as the study does.
+    /// Times of steps, measured as in a study.
     pub sample: Sample,
-    /// Of phases, with the clock read around each (ns).
+    /// Times of phases, with the clock read around each (ns).
     phases: [Vec<f64>; Phase::ALL.len()],
-    /// Whether the timed passes ended in the bits of the run whose errors were measured.
+    /// Whether the timed passes ended in the same bits as the run whose errors were measured.
     pub same_bits: bool,
 }
 
 impl Times {
-    /// Of all steps of a scene; `hash` is the state after the run whose errors were measured.
+    /// Times all steps of a scene. `hash` is the final state of the run whose errors were measured.
     ///
     /// Errors: a scene that cannot be built, or that diverges.
     pub fn measure(scene: &Scene, settings: Settings, hash: u64) -> Result<Self, Error> {
@@ -54,7 +54,7 @@ impl Times {
         all.map(|(phase, times)| (phase.name().to_string(), median(times)))
     }
 
-    /// The phase that takes most of a median step, and its share (1).
+    /// The phase with the largest share of a median step, and that share (1).
     pub fn longest(&self) -> (&'static str, f64) {
         let all = || Phase::ALL.iter().zip(&self.phases).map(|(phase, times)| (phase.name(), median(times)));
         let whole: f64 = all().map(|(_, ns)| ns).sum();
@@ -62,8 +62,8 @@ impl Times {
         (name, ns / whole.max(1.0))
     }
 
-    /// The phase that takes most of the longest step of the clocked pass, its number from 1, and its share of that
-    /// step (1).
+    /// The phase with the largest share of the longest step of the clocked pass, the number of that step
+    /// counted from 1, and the share (1).
     fn longest_step(&self) -> Option<(&'static str, usize, f64)> {
         let whole = |i: usize| self.phases.iter().map(|times| times[i]).sum::<f64>();
         let count = self.phases.first().map_or(0, Vec::len);
@@ -73,7 +73,7 @@ impl Times {
         Some((phase.name(), step + 1, times[step] / whole(step).max(1.0)))
     }
 
-    /// Median and longest step in words.
+    /// Median and longest step as text.
     pub fn spread(&self) -> String {
         let s = &self.sample;
         let mut text =
@@ -101,7 +101,7 @@ impl Times {
         text
     }
 
-    /// Mean and median per step; phases that the solver does not have are left out.
+    /// Table of mean and median per step. Phases that the solver does not have are left out.
     pub fn table(&self) -> String {
         let mean = |times: &[f64]| times.iter().sum::<f64>() / times.len().max(1) as f64;
         let most = |times: &[f64]| times.iter().copied().fold(0.0, f64::max);

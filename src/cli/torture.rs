@@ -1,4 +1,4 @@
-//! `simpulse torture`: random scenes, by family and seed, and checks that every solver has to pass.
+//! `simpulse torture`: random scenes, by family and seed, with checks that every solver has to pass.
 
 use super::output::{note, print, print_json, value};
 use super::progress::Bar;
@@ -25,11 +25,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Run random scenes and count failures that no solver may have
 ///
-/// Twelve families of hard scenes: drops, stacks of large mass ratios, fast bodies, mixed surfaces, pistons and
-/// stirrers, overlaps, extreme steps, centimeters beside a hundred meters, plates and needles, far from the origin,
-/// walls that are hit, ropes and beams with loads. Every scene runs under every solver, on all cores; only poses are checked, in double
-/// precision. A scene fails if it diverges, gains energy, flings a body, lets one escape from its walls, ends with
-/// bodies inside each other or joints apart, or does not come to rest when it should. The same seed gives the same scenes.
+/// Twelve families of hard scenes: drops, stacks of large mass ratios, fast bodies, mixed surfaces, pistons
+/// and stirrers, overlaps, extreme steps, centimeters beside a hundred meters, plates and needles, far from
+/// the origin, walls that are hit, ropes and beams with loads. Every scene runs under every given solver, on
+/// all cores. Only poses are checked, in double precision. A scene fails if it diverges, gains energy, flings
+/// a body, lets one escape from its walls, ends with bodies inside each other or joints apart, or does not
+/// come to rest when it should. The same seed gives the same scenes.
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Examples:
@@ -51,7 +52,7 @@ pub struct TortureArgs {
     /// One scene, as FAMILY:NUMBER
     #[arg(long, value_name = "FAMILY:NUMBER", conflicts_with_all = ["scenes", "families"])]
     pub only: Option<String>,
-    /// Solvers; the default solver where none are given
+    /// Solvers; the default solver if none are given
     #[command(flatten)]
     pub solvers: Solvers,
     /// Continuous collision: stop fast bodies at the surfaces that they would pass through [default: the solver's]
@@ -66,8 +67,8 @@ pub struct TortureArgs {
     /// Write one line of JSON per scene and solver; scenes already in the file are not run again
     #[arg(long, value_name = "FILE")]
     pub log: Option<PathBuf>,
-    /// Also time the steps of each scene, N times: the longest over the median at as many contacts. On one thread unless
-    /// `--threads` says otherwise
+    /// Also time the steps of each scene, N times: the longest step ÷ the median at the same number of
+    /// contacts. Runs on one thread unless `--threads` is given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100))]
     pub pace: Option<u32>,
     /// Exit with code 1 if a solver fails more scenes than this
@@ -87,7 +88,7 @@ impl TortureArgs {
         Ok(Settings { continuous: self.continuous.unwrap_or(own.continuous), without, ..own })
     }
 
-    /// The name of a solver in rows, with options that differ from its default.
+    /// Name of a solver in rows, with the options that differ from its defaults.
     fn name(&self, solver: &Variant) -> String {
         let mut name = solver.name.to_string();
         match self.continuous {
@@ -106,7 +107,7 @@ fn family_value() -> impl TypedValueParser<Value = &'static Family> {
     PossibleValuesParser::new(FAMILIES.iter().map(|f| f.name)).try_map(|name| family(&name))
 }
 
-/// A scene in the queue.
+/// A queued scene: family, number, solver.
 type TortureJob = (&'static Family, u32, &'static Variant);
 
 /// Runs the command.
@@ -171,7 +172,7 @@ fn chosen(args: &TortureArgs) -> Result<Vec<(&'static Family, u32)>, Error> {
     Ok(vec![(family(name)?, number.parse().map_err(|_| invalid())?)])
 }
 
-/// The rows of a log, and the log to append to. A truncated last line is dropped.
+/// Opens a log: its rows, and the file to append to. A truncated last line is dropped.
 fn opened(path: &Path) -> Result<(Vec<TortureRow>, Option<File>), Error> {
     let text = match path.exists() {
         true => read_to_string(path).map_err(Error::io(path))?,
@@ -191,7 +192,8 @@ fn opened(path: &Path) -> Result<(Vec<TortureRow>, Option<File>), Error> {
     Ok((rows, Some(file)))
 }
 
-/// Runs every job, on as many threads as there are cores; rows in the order of the jobs.
+/// Runs all jobs on `--threads` threads (by default one per core, or one with `--pace`). Rows are in the
+/// order of the jobs.
 fn run_all(args: &TortureArgs, jobs: &[TortureJob], log: Option<File>) -> Result<Vec<TortureRow>, Error> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let cores = if args.pace.is_some() { 1 } else { cores };
@@ -226,7 +228,8 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
-/// One scene under one solver; kept, minimized, if it fails and a folder is given.
+/// Runs one scene under one solver. If it fails and a folder is given, the scene is minimized and written
+/// there.
 fn one(
     args: &TortureArgs,
     family: &'static Family,

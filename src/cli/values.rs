@@ -1,4 +1,4 @@
-//! Values of options: an option means the same in every command; help and error messages list all its values.
+//! Option values. An option means the same in every command; help and error messages list all its values.
 
 use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
@@ -15,12 +15,12 @@ use clap::builder::{
     NonEmptyStringValueParser, OsStringValueParser, PossibleValue, PossibleValuesParser, TypedValueParser,
 };
 
-/// A member of `--solvers`.
+/// An element of `--solvers`.
 #[derive(Clone, Debug)]
 pub enum Choice {
     /// `all`
     All,
-    /// A name.
+    /// The solver of this name.
     One(&'static Variant),
 }
 
@@ -37,7 +37,7 @@ fn solvers_help() -> String {
 }
 
 impl Solvers {
-    /// Each once, in the order given; the default list if none are given.
+    /// Each solver once, in the order given; the default list if none are given.
     pub fn chosen(&self) -> Vec<&'static Variant> {
         if self.solvers.is_empty() {
             return default_solvers();
@@ -58,7 +58,7 @@ impl Solvers {
     }
 }
 
-/// A line that names the solvers that the default list does not run.
+/// A line with the solvers that did not run; used to note what the default list leaves out.
 pub fn left_out(ran: &[&'static Variant]) -> String {
     let ran: Vec<&str> = ran.iter().map(|v| v.name).collect();
     match study::left_out(&ran).as_slice() {
@@ -67,7 +67,7 @@ pub fn left_out(ran: &[&'static Variant]) -> String {
     }
 }
 
-/// The parser of scenes: a name, or the path of a file, which need not be text.
+/// The parser of scenes: a name, or a path, which need not be valid UTF-8.
 pub fn scene() -> impl TypedValueParser<Value = String> {
     OsStringValueParser::new().try_map(|given| match given.is_empty() {
         true => Err("a name or a file is required"),
@@ -152,13 +152,13 @@ pub struct WithoutArgs {
 }
 
 impl WithoutArgs {
-    /// Those of `solver`. Errors: a mechanism that it does not have.
+    /// The mechanisms to leave out of `solver`. Errors: a mechanism that the solver does not have.
     pub fn of(&self, solver: &Variant) -> Result<Without, Error> {
         self.without.iter().try_fold(Without::default(), |all, name| Ok(all.and(solver.mechanism(name)?)))
     }
 }
 
-/// Each width once, from the narrowest; `own` where none are given.
+/// Each width once, in ascending order; `own` if none are given.
 pub fn widths(given: &[LaneWidth], own: Vec<LaneWidth>) -> Vec<LaneWidth> {
     if given.is_empty() {
         return own;
@@ -199,7 +199,7 @@ pub struct SettingArgs {
 }
 
 impl SettingArgs {
-    /// The default solver as it is.
+    /// The default solver at its standard setting.
     pub fn standard() -> Result<Self, Error> {
         let (none, solver) = (None, find(DEFAULT)?);
         Ok(SettingArgs {
@@ -222,7 +222,7 @@ impl SettingArgs {
         Ok(Settings { budget, parameters, impacts, without, ..Settings::new(self.solver) })
     }
 
-    /// The budget. Errors: one that the solver cannot run with; sweeps that it does not make.
+    /// The budget. Errors: one that the solver cannot run with; sweeps of a kind that it does not have.
     pub fn budget(&self) -> Result<Budget, Error> {
         let own = self.solver.budget;
         let given = [
@@ -243,7 +243,7 @@ impl SettingArgs {
         Ok(chosen)
     }
 
-    /// The solver's parameters. Errors: one that it does not have, a value out of its range.
+    /// The solver's parameters. Errors: a parameter that it does not have, a value out of its range.
     pub fn parameters(&self) -> Result<Parameters, Error> {
         overrides::check(&[self.solver], &self.set)?;
         overrides::values(self.solver, &self.set)

@@ -1,4 +1,4 @@
-//! `simpulse verify`: hard cases with known answers, against every solver.
+//! `simpulse verify`: hard cases with known answers, for every solver.
 
 use super::output::{self, finite, print_json};
 use super::progress::Bar;
@@ -89,7 +89,7 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
 /// Mean time of a case on one Zen 5 core (s).
 const SECONDS_PER_CASE: f64 = 0.25;
 
-/// 1 if the default solver ran and failed a required case.
+/// 1 if the default solver ran and failed a required case, otherwise 0.
 fn exit_code(matrix: &VerifyMatrix) -> ExitCode {
     match matrix.broken_promises(DEFAULT) {
         Some(broken) if !broken.is_empty() => ExitCode::FAILURE,
@@ -178,7 +178,7 @@ fn text(matrix: &VerifyMatrix) -> String {
     text + &left
 }
 
-/// The value that all solvers share; none if they differ.
+/// The value that all solvers share; `None` if they differ.
 fn common(cells: &[Cell], value: impl Fn(&Finding) -> f64) -> Option<f64> {
     let mut values = cells.iter().filter_map(|cell| match cell {
         Cell::Found(finding) => Some(value(finding)),
@@ -204,7 +204,7 @@ fn cell_text(cell: &Cell, with_truth: bool) -> String {
     }
 }
 
-/// The small table of a sweep, one column per solver.
+/// Table of a sweep, one column per solver.
 fn sweeps(matrix: &VerifyMatrix, row: usize, case: &Case) -> String {
     let columns = matrix.solvers.iter().zip(&matrix.cells[row]);
     let found: Vec<(&str, &ParameterSweep)> = columns
@@ -232,7 +232,7 @@ fn plain() -> Table {
     table
 }
 
-/// Four significant digits, in powers of ten where that is shorter.
+/// Four significant digits; in powers of ten if that is shorter.
 fn number(value: f64) -> String {
     match value.abs() {
         _ if value.is_infinite() => {
@@ -297,7 +297,7 @@ fn json(matrix: &VerifyMatrix, impacts: Impacts) -> Value {
     })
 }
 
-/// A case: what it measures, and what is required.
+/// Description of a case: its measured quantity and its requirements.
 fn described(case: &&Case) -> Value {
     let (required, why) = match case.required {
         Required::Yes(why) => (true, why),
@@ -309,7 +309,7 @@ fn described(case: &&Case) -> Value {
     })
 }
 
-/// To standard output, with this exit code.
+/// Prints to standard output and returns this exit code.
 fn print(text: &str, code: ExitCode) -> Result<ExitCode, Error> {
     output::print(text).map(|_| code)
 }

@@ -18,7 +18,7 @@ pub enum Phase {
     WarmStart,
     /// Velocity sweeps with position feedback.
     Solve,
-    /// Velocity sweeps without.
+    /// Velocity sweeps without position feedback.
     Relax,
     /// Position sweeps.
     Position,
@@ -26,7 +26,7 @@ pub enum Phase {
     Restitution,
     /// Body integration.
     Integrate,
-    /// Impulses and poses written back.
+    /// Write-back of impulses and poses.
     Store,
 }
 
@@ -98,14 +98,14 @@ impl Timings {
     }
 }
 
-/// Memory requests of the passes of one phase, if counted.
+/// Memory traffic of the passes of one phase, if counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[doc(hidden)]
 pub struct Requested {
-    /// By kind of body a: contacts visited times floats read, floats written, rows gathered, half
-    /// rows written.
+    /// Sums over visited contacts, by kind of body a: floats read, floats written, rows gathered, half rows
+    /// written.
     pub contacts: [[f64; 4]; 3],
-    /// Bytes read and written besides: of bodies, of vectors.
+    /// Other bytes read and written: of bodies and of vectors.
     pub bytes: [f64; 2],
 }
 
@@ -113,14 +113,14 @@ pub struct Requested {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[doc(hidden)]
 pub struct PhaseFilter {
-    /// The only phase that runs; none: all do.
+    /// The only phase that runs; `None` runs all.
     pub only: Option<Phase>,
-    /// Whether one lane is [`crate::engine::lanes::Counted`].
+    /// Whether the phase runs in one lane that counts, [`crate::engine::lanes::Counted`].
     pub counted: bool,
 }
 
 impl PhaseFilter {
-    /// A whole step.
+    /// All phases of a step.
     pub const ALL: PhaseFilter = PhaseFilter { only: None, counted: false };
 
     /// Whether passes of `phase` run.
@@ -130,7 +130,8 @@ impl PhaseFilter {
     }
 }
 
-/// Adds the time since the last lap to a phase, and counts laps; reads no clock while it is off.
+/// Stopwatch of a step: each lap adds the time since the last one to a phase. A clock that is off counts laps
+/// without reading the time.
 #[derive(Debug)]
 #[doc(hidden)]
 pub struct Clock {
@@ -138,12 +139,12 @@ pub struct Clock {
     start: Option<(Instant, Instant)>,
     requested: Requested,
     laps: [u32; Phase::ALL.len()],
-    /// Time that the thread had waited at the last lap, where that is taken out.
+    /// Wait time of the thread at the last lap, if waits are subtracted.
     waited: Option<Duration>,
 }
 
 impl Clock {
-    /// Starts a step.
+    /// Starts a step; `on`: times are measured.
     pub fn start(on: bool) -> Self {
         let start = on.then(|| {
             let now = Instant::now();
@@ -158,31 +159,31 @@ impl Clock {
         }
     }
 
-    /// Starts a step from whose times the pauses are taken out in which the thread waited for a
-    /// processor, where the system tells them. A lap then takes some microseconds, which are not
-    /// booked; the time of the step is that of its phases.
+    /// Starts a step whose times exclude the pauses in which the thread waited for a processor, if the system
+    /// reports them. Each lap then costs a few microseconds, which are not counted. The time of the step is
+    /// the sum of its phases.
     pub(crate) fn without_pauses() -> Self {
         Clock { waited: waited(), ..Clock::start(true) }
     }
 
-    /// Counts the bytes that a pass requests on `contacts` contacts whose body a is of kind `opposite`.
+    /// Counts the memory traffic of a pass over `contacts` contacts whose body a is of kind `opposite`.
     pub(crate) fn book(&mut self, opposite: usize, contacts: usize, per_contact: [usize; 4]) {
         for (sum, each) in self.requested.contacts[opposite].iter_mut().zip(per_contact) {
             *sum += contacts as f64 * each as f64;
         }
     }
 
-    /// Books bytes read and written.
+    /// Adds bytes read and written.
     pub(crate) fn book_bytes(&mut self, bytes: [f64; 2]) {
         self.requested.bytes = [0, 1].map(|k| self.requested.bytes[k] + bytes[k]);
     }
 
-    /// The times so far.
+    /// The memory traffic so far.
     pub(crate) fn requested(&self) -> Requested {
         self.requested
     }
 
-    /// Laps of each phase; indexed by `Phase as usize`.
+    /// Laps of each phase, indexed by `Phase as usize`.
     pub(crate) fn laps(&self) -> [u32; Phase::ALL.len()] {
         self.laps
     }
@@ -217,14 +218,14 @@ impl Clock {
     }
 }
 
-/// Time that this thread was ready but not running, since it started. None where the system does not report it; time
-/// taken by a hypervisor is not included.
+/// Time for which this thread was ready but not running, since it started. `None` if the system does not
+/// report it. Time taken by a hypervisor is not included.
 #[doc(hidden)]
 pub fn waited() -> Option<Duration> {
     #[cfg(target_os = "linux")]
     {
         use std::os::unix::fs::FileExt;
-        // Kept open: looking the path up takes as long as a step of a small scene.
+        // Kept open: resolving the path takes as long as a step of a small scene.
         thread_local!(static STAT: Option<std::fs::File> = std::fs::File::open("/proc/thread-self/schedstat").ok());
         let mut text = [0; 96];
         let length = STAT.with(|file| file.as_ref()?.read_at(&mut text, 0).ok())?;
@@ -234,7 +235,8 @@ pub fn waited() -> Option<Duration> {
     None
 }
 
-/// What `act` returns and how long it took, without the pauses in which this thread waited for a processor.
+/// Runs `act`; returns its result and its duration without the pauses in which this thread waited for a
+/// processor.
 #[doc(hidden)]
 pub fn timed<T>(act: impl FnOnce() -> T) -> (T, Duration) {
     let (before, start) = (waited(), Instant::now());
@@ -244,7 +246,7 @@ pub fn timed<T>(act: impl FnOnce() -> T) -> (T, Duration) {
     (result, elapsed.saturating_sub(pause.unwrap_or_default()))
 }
 
-/// Time on a processor, time waiting, times scheduled: nanoseconds, nanoseconds, a count.
+/// Reads the wait time from "time on a processor (ns), time waiting (ns), number of times scheduled".
 #[cfg(any(target_os = "linux", test))]
 fn parse_wait(text: &str) -> Option<Duration> {
     text.split_whitespace().nth(1)?.parse().ok().map(Duration::from_nanos)

@@ -1,45 +1,43 @@
-//! Colors: groups of constraints that may be solved at the same time.
+//! Colors: groups of constraints that can be solved at the same time.
 //!
-//! Two constraints that push the same body must not share a color, so that
-//! the lanes of a batch (and, one day, the threads of a color) write to
-//! different bodies. In the terms of graph theory this colors the *edges* of
-//! the graph whose nodes are bodies. An edge is any constraint on two bodies:
-//! a contact, a joint.
+//! Two constraints that push the same body must not share a color, so that the lanes of a batch (and, one
+//! day, the threads of a color) write to different bodies. In graph theory this is a coloring of the *edges*
+//! of the graph whose nodes are bodies. An edge is any constraint on two bodies, such as a contact or a
+//! joint.
 //!
-//! Edges are taken in order and get the lowest color free at both ends (first
-//! fit). At its turn an edge shares ends with at most 2(Δ − 1) colored edges,
-//! Δ being the most edges at one body, so first fit needs at most 2Δ − 1
-//! colors; Vizing's theorem says that no coloring does with fewer than Δ and
-//! some with Δ + 1. Nothing depends on the lane width: all widths solve in the
-//! same order and reach the same bits.
+//! Edges are processed in order and get the lowest color free at both ends (first fit). Let Δ be the largest
+//! number of edges at one body. When an edge is processed, it shares ends with at most 2(Δ − 1) colored
+//! edges, so first fit needs at most 2Δ − 1 colors. By Vizing's theorem every coloring needs at least Δ
+//! colors, and some coloring needs at most Δ + 1. Nothing depends on the lane width: all widths solve in the
+//! same order and give the same bits.
 //!
-//! **Colors kept from step to step** were tried: edges that were there before keep their color
-//! and the others are fitted in. In a turning drum (25 000 edges, 180 of them new in a step) and
-//! on pyramids (54 000) that took 0.8 to 0.9 of the time of first fit (3.3 ns per edge), and half
-//! as much again to look the last colors up; in the drum it needed 1.3 colors more. What saves
-//! time is not to call [`Coloring::assign`] while no edge comes or goes.
+//! **Colors kept from step to step** were tried: edges that already existed keep their color, and the others
+//! are fitted in. In a turning drum (25 000 edges, 180 of them new in a step) and on pyramids (54 000) this
+//! took 0.8 to 0.9 of the time of first fit (3.3 ns per edge), plus half of that time to look up the last
+//! colors; in the drum it needed 1.3 more colors. Time is saved instead by not calling [`Coloring::assign`]
+//! while the set of edges does not change.
 //!
 //! **Source:** Catto 2024, "SIMD Matters" (`catto2024simd`).
 
 use crate::engine::lanes::held;
 
-/// Stands for a side that any number of edges of a color may share: a static
-/// or kinematic body is read but never written.
+/// Marks a side that any number of edges of a color may share: a static or kinematic body, which is read but
+/// never written.
 pub const EXEMPT: u32 = u32::MAX;
 
-/// Maximum number of colors: the bits of a mask. With a mask per body the lowest free color of an edge is one OR and
-/// one bit count, where lists or a table of color × body would search.
+/// Maximum number of colors: the bits of a mask. With a mask per body, the lowest free color of an edge takes
+/// one OR and one bit count; lists or a table of color × body would need a search.
 pub const MAX_COLORS: usize = u64::BITS as usize;
 
-/// The color of edges without a color.
+/// Marks edges that did not get a color.
 pub const OVERFLOW: u8 = u8::MAX;
 
-/// A coloring of edges and the buffers to make the next one.
+/// A coloring of edges, with buffers for the next one.
 #[derive(Clone, Debug, Default)]
 pub struct Coloring {
     edges: Vec<[u32; 2]>,
     body_count: usize,
-    /// Colors in use at each body, and a last mask for exempt sides that stays zero.
+    /// Colors used at each body, and a last mask for exempt sides that stays zero.
     used: Vec<u64>,
     color_of: Vec<u8>,
     order: Vec<u32>,
@@ -52,11 +50,10 @@ impl Coloring {
         Self::default()
     }
 
-    /// Colors `edges`, given by body index; an index of [`EXEMPT`], or any
-    /// other from `body_count` on, needs no exclusivity.
+    /// Colors `edges`, given by body index. [`EXEMPT`] and any other index from `body_count` on may be shared
+    /// by edges of a color.
     ///
-    /// Returns at once if the arguments are those of the last call, as they
-    /// are while a pile rests.
+    /// Returns at once if the arguments are the same as in the last call, for example while a pile rests.
     pub fn assign(&mut self, edges: &[[u32; 2]], body_count: usize) {
         if self.is_current(edges, body_count) {
             return;
@@ -69,13 +66,13 @@ impl Coloring {
         self.color_of.clear();
         self.color_of.reserve(edges.len());
 
-        // Index MAX_COLORS counts the overflow.
+        // Index MAX_COLORS counts overflow edges.
         let mut count = [0u32; MAX_COLORS + 1];
         for &[a, b] in edges {
             let (a, b) = ((a as usize).min(body_count), (b as usize).min(body_count));
             let color = (self.used[a] | self.used[b]).trailing_ones();
             count[color as usize] += 1;
-            // A shift by 64 leaves no bit: overflow takes no color.
+            // A shift by 64 leaves no bit set: overflow edges use no color.
             let bit = 1u64.checked_shl(color).unwrap_or(0);
             self.used[a] |= bit;
             self.used[b] |= bit;
@@ -91,7 +88,7 @@ impl Coloring {
         for color in 0..MAX_COLORS {
             next[color + 1] = next[color] + count[color];
         }
-        // First fit opens color c + 1 only after c: those in use are a prefix.
+        // First fit uses color c + 1 only after c, so the used colors are a prefix.
         let colors = count[..MAX_COLORS].iter().take_while(|&&n| n > 0).count();
         self.starts.clear();
         self.starts.extend_from_slice(&next[..=colors]);
@@ -109,13 +106,13 @@ impl Coloring {
         self.starts.clear();
     }
 
-    /// Bytes held.
+    /// Allocated bytes.
     pub fn held_bytes(&self) -> usize {
         let small = held(&self.color_of) + held(&self.starts) + held(&self.order);
         small + held(&self.edges) + held(&self.used)
     }
 
-    /// Whether the coloring belongs to these edges.
+    /// Whether the coloring is that of these edges.
     pub fn is_current(&self, edges: &[[u32; 2]], body_count: usize) -> bool {
         self.body_count == body_count && self.edges == edges && !self.starts.is_empty()
     }
@@ -135,13 +132,13 @@ impl Coloring {
         &self.order
     }
 
-    /// Where each color starts in [`Self::order`], and where the last one ends;
-    /// `[colors + 1]`, or empty before the first call of [`Self::assign`].
+    /// Start of each color in [`Self::order`], and the end of the last one; `[colors + 1]`, or empty before
+    /// the first call of [`Self::assign`].
     pub fn starts(&self) -> &[u32] {
         &self.starts
     }
 
-    /// Edges of one color, ascending; none if the color is not in use.
+    /// Edges of one color, ascending; empty if the color is not used.
     pub fn color(&self, color: usize) -> &[u32] {
         match self.starts.get(color..color.saturating_add(2)) {
             Some(range) => &self.order[range[0] as usize..range[1] as usize],
@@ -149,15 +146,15 @@ impl Coloring {
         }
     }
 
-    /// Edges left without a color, ascending. Solve them one by one.
+    /// Edges without a color, ascending. They must be solved one by one.
     pub fn overflow(&self) -> &[u32] {
         &self.order[self.starts.last().map_or(0, |&end| end as usize)..]
     }
 
-    /// Lanes in all batches when each color is cut into batches of `width`
-    /// and the last one filled up; zero for width zero.
+    /// Number of lanes in all batches of `width` lanes, with the last batch of each color padded; zero for
+    /// width zero.
     ///
-    /// Occupancy is the colored edges over this.
+    /// Occupancy is the number of colored edges divided by this.
     pub fn lane_slots(&self, width: usize) -> usize {
         if width == 0 {
             return 0;

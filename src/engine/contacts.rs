@@ -1,4 +1,4 @@
-//! Contact manifolds and the impulses they carry from step to step.
+//! Contact manifolds, and the impulses they keep from step to step.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec2;
@@ -8,14 +8,14 @@ use glam::Vec2;
 #[repr(C)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ManifoldPoint {
-    /// From the center of mass of body a to the contact point, world axes (m): midway between both surfaces, or
-    /// on that of b if a is static or kinematic.
+    /// From the center of mass of body a to the contact point, world axes (m). The point is midway between
+    /// both surfaces, or on that of b if a is static or kinematic.
     pub anchor_a: Vec2,
     /// From the center of mass of body b to the same point, world axes (m).
     pub anchor_b: Vec2,
     /// Signed gap along the normal (m); negative is overlap.
     pub separation: f32,
-    /// Names the pair of features that touch; the same from step to step while they do.
+    /// Identifies the pair of touching features; constant from step to step while they touch.
     pub feature_id: u32,
     /// Accumulated normal impulse, ≥ 0 (N·s).
     pub normal_impulse: f32,
@@ -56,8 +56,8 @@ pub struct Manifold {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
-/// The narrow phase writes the first five in lanes and preparation reads them in lanes, so their
-/// order is part of both: `[anchors, gap and impulses]` of each point, then `[n, count, µ]`.
+/// The narrow phase writes the first five quads in lanes, and preparation reads them in lanes, so both depend
+/// on their order: `[anchors, gap and impulses]` of each point, then `[n, count, µ]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -68,7 +68,8 @@ pub struct Contact {
     pub friction: f32,
     /// Mixed restitution max(ea, eb).
     pub restitution: f32,
-    /// Shape a: the static or kinematic one if there is one, else the lower index.
+    /// Shape a: the shape of the static or kinematic body if there is one, otherwise the one with the lower
+    /// index.
     pub shape_a: u32,
     /// Shape b, always of a dynamic body.
     pub shape_b: u32,
@@ -76,11 +77,11 @@ pub struct Contact {
     pub body_a: u32,
     /// Body of shape b.
     pub body_b: u32,
-    /// Per point, normal and tangential impulse summed over the step (N·s);
-    /// only kept while `Settings::record_impulses` is on.
+    /// Per point, normal and tangential impulse summed over the step (N·s); recorded only while
+    /// `Settings::record_impulses` is on.
     pub step_impulse: [[f32; 2]; 2],
-    /// Radii of curvature of the surfaces of a and b at the point of a round contact (m): 0 at a sharp corner,
-    /// infinite on a face; both 0 where nothing is round. Only computed for solvers that request them.
+    /// Radii of curvature of the surfaces of a and b at the point of a round contact (m): 0 at a sharp
+    /// corner, infinite on a face; both 0 if nothing is round. Only computed for solvers that request them.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub radii: [f32; 2],
     /// Padding to two cache lines.
@@ -103,7 +104,7 @@ pub mod quad {
     pub const STATE_1: usize = 3;
     /// `[normal, count, friction]`.
     pub const HEADER: usize = 4;
-    /// `[of the step's impulses, radii, unused]`.
+    /// `[last impulse of the step, radii, unused]`.
     pub const RADII: usize = 7;
 }
 

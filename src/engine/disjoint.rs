@@ -1,27 +1,27 @@
-//! Disjoint sets (union–find): which of some elements belong together.
+//! Disjoint sets (union–find).
 
 use crate::engine::lanes::held;
 
-/// Sets of the numbers below a count; keeps its memory.
+/// A partition of the numbers below a count into sets. Reuses its memory.
 #[derive(Clone, Debug, Default)]
 pub struct DisjointSets {
-    /// An element of the same set that is not greater; the least one of a set stands for itself.
+    /// A smaller element of the same set, or the element itself if it is the smallest.
     parent: Vec<u32>,
 }
 
 impl DisjointSets {
-    /// Begins with `count` sets of one element each.
+    /// Starts with `count` sets of one element each.
     pub fn begin(&mut self, count: usize) {
         self.parent.clear();
         self.parent.extend(0..count as u32);
     }
 
-    /// Bytes that it holds.
+    /// Allocated bytes.
     pub fn bytes(&self) -> usize {
         held(&self.parent)
     }
 
-    /// The least element of the set of `element`.
+    /// The smallest element of the set of `element`.
     pub fn least(&mut self, element: u32) -> u32 {
         let parent = &mut self.parent;
         let mut at = element as usize;
@@ -32,7 +32,7 @@ impl DisjointSets {
         at as u32
     }
 
-    /// Makes one set of those of `a` and `b`.
+    /// Merges the sets of `a` and `b`.
     pub fn join(&mut self, a: u32, b: u32) {
         let [a, b] = [a, b].map(|element| self.least(element));
         self.parent[a.max(b) as usize] = a.min(b);

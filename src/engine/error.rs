@@ -1,4 +1,4 @@
-//! Errors of the engine's callers.
+//! Errors that the engine returns for invalid input.
 //!
 //! Hot loops are infallible. A simulation that diverges is an *outcome*
 //! ([`crate::engine::world::Divergence`]), not an error.
@@ -10,14 +10,14 @@ use std::fmt;
 pub enum Error {
     /// A value out of its range.
     Invalid {
-        /// Where the value stands, for example `vertices`.
+        /// Path of the value, for example `vertices`.
         place: String,
         /// The reason, with the value.
         message: String,
     },
-    /// A handle of a removed body.
+    /// The handle of a removed body.
     Removed {
-        /// The index that the body had.
+        /// Index of the removed body.
         body: usize,
     },
     /// A name that is not in its table.
@@ -26,7 +26,7 @@ pub enum Error {
         kind: &'static str,
         /// The name as given.
         name: String,
-        /// The names there are.
+        /// The valid names.
         known: Vec<&'static str>,
     },
 }

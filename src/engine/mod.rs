@@ -1,4 +1,4 @@
-//! The engine: it advances bodies with shapes by one step at a time.
+//! The engine: advances bodies and their shapes one step at a time.
 //!
 //! ```
 //! # use simpulse_engine as simpulse;

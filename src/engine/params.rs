@@ -1,19 +1,19 @@
 //! Tuning constants with their units, and the budget of a step.
 //!
-//! Lengths and speeds are for bodies of about a meter. A world of others has a
-//! [`length_unit`](crate::engine::world::Settings::length_unit), by which they are multiplied, but for gravity and
+//! Lengths and speeds are chosen for bodies of about a meter. For other sizes, a world's
+//! [`length_unit`](crate::engine::world::Settings::length_unit) multiplies all of them except gravity and
 //! density.
 
-/// Overlap that position correction leaves alone (m), so that resting contacts stay contacts.
-/// Larger: visible overlap. Smaller: contacts flicker.
+/// Overlap that position correction leaves uncorrected (m), so that resting contacts persist. Larger: visible
+/// overlap. Smaller: contacts flicker.
 pub const LINEAR_SLOP: f32 = 0.005;
 
-/// Points closer than this (m) become contacts before they touch, so that a
-/// step ends at the surface instead of behind it. Four slops.
+/// Points closer than this (m) become contacts before they touch, so that a step ends at the surface instead
+/// of behind it. Four slops.
 pub const SPECULATIVE_DISTANCE: f32 = 4.0 * LINEAR_SLOP;
 
-/// A shape's bounds are grown by this (m), so that pairs are looked for only when a body
-/// has moved that far. Larger: more candidates. Smaller: more searches.
+/// Margin by which a shape's bounds are enlarged (m). Pairs are searched again only after a shape leaves its
+/// enlarged bounds. Larger: more candidates. Smaller: more searches.
 pub const AABB_MARGIN: f32 = 0.1;
 
 /// Fraction of the overlap that Baumgarte stabilization removes per step (1).
@@ -26,20 +26,20 @@ pub const CONTACT_HERTZ: f32 = 30.0;
 /// A soft contact's frequency is capped at this fraction of the substep rate (1).
 pub const CONTACT_HERTZ_FRACTION: f32 = 0.125;
 
-/// The same for solvers without substeps (1).
+/// [`CONTACT_HERTZ_FRACTION`] of solvers without substeps (1).
 pub const CONTACT_HERTZ_FRACTION_OF_STEP: f32 = 1.0 / 3.0;
 
-/// Damping ratio of a soft contact (1): far above critical, so that it does not bounce.
+/// Damping ratio of a soft contact (1), far above critical so that the contact does not bounce.
 pub const CONTACT_DAMPING_RATIO: f32 = 10.0;
 
-/// Fastest speed at which overlap is pushed apart (m/s).
+/// Maximum speed at which overlapping bodies are pushed apart (m/s).
 pub const MAX_PUSH_SPEED: f32 = 3.0;
 
-/// Largest overlap that one position sweep removes at a point (m): more would turn bodies further than a linearized
-/// contact can follow.
+/// Maximum overlap that one position sweep removes at a point (m). Removing more would turn bodies further
+/// than a linearized contact can follow.
 pub const MAX_POSITION_CORRECTION: f32 = 0.2;
 
-/// Approach speeds above this bounce (m/s), where a source has no other.
+/// Approach speed above which contacts bounce (m/s), unless the solver's source states another.
 pub const RESTITUTION_THRESHOLD: f32 = 1.0;
 
 /// Maximum number of vertices of a convex polygon.
@@ -60,17 +60,17 @@ pub const DEFAULT_DT: f64 = 1.0 / 60.0;
 /// Approach speed above which a contact reports a hit (m/s).
 pub const HIT_SPEED: f32 = 1.0;
 
-/// Bodies faster than this (length units per second) or, in rad/s, spinning faster than this, have diverged.
+/// A body has diverged if its speed (length units per second) or its spin (rad/s) exceeds this.
 pub const DIVERGED_SPEED: f32 = 1.0e5;
 
 /// The work of one step.
 ///
-/// Each solver reads the fields that its schedule has and ignores the rest;
-/// its row in [`crate::engine::solvers::VARIANTS`] says which.
+/// Each solver uses the fields of its schedule and ignores the rest; its row in
+/// [`crate::engine::solvers::VARIANTS`] lists them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Budget {
-    /// Equal parts that a step is cut into (≥ 1).
+    /// Number of equal substeps of a step (≥ 1).
     pub substeps: u32,
     /// Velocity sweeps over all constraints per substep, with position feedback.
     pub velocity_iterations: u32,
@@ -100,20 +100,21 @@ pub struct Parameter {
     pub trials: &'static [f32],
 }
 
-/// A mechanism of a solver that a run can leave out, to see what it is for.
+/// A mechanism of a solver that a run can disable, to measure its effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mechanism {
     /// Name for settings, records and the command line, in `snake_case`.
     pub name: &'static str,
     /// Its purpose in one line.
     pub meaning: &'static str,
-    /// A check that fails without it: a case of `simpulse verify`, `torture`, a family and what more of its scenes fail by, or a test.
+    /// A check that fails without it: a case of `simpulse verify`, a test, or `torture` with a family and the
+    /// kind of failure that becomes more frequent.
     pub case: &'static str,
-    /// Lines of code in files of its own, see [`lines_of`].
+    /// Lines of code in the files of this mechanism alone, see [`lines_of`].
     pub lines: u32,
 }
 
-/// Lines of a text that are neither blank nor comments, up to its tests.
+/// Lines of a source text that are neither blank nor comments, up to its unit tests.
 pub const fn lines_of(text: &str) -> u32 {
     let (text, mut i, mut count) = (text.as_bytes(), 0, 0);
     while i < text.len() && !begins(text, i, b"#[cfg(test)]") {
@@ -132,7 +133,7 @@ pub const fn lines_of(text: &str) -> u32 {
     count
 }
 
-/// Whether this stands in a text from `at` on.
+/// Whether `text` contains `with` at position `at`.
 const fn begins(text: &[u8], at: usize, with: &[u8]) -> bool {
     let mut k = 0;
     while k < with.len() && at + k < text.len() && text[at + k] == with[k] {
@@ -141,18 +142,18 @@ const fn begins(text: &[u8], at: usize, with: &[u8]) -> bool {
     k == with.len()
 }
 
-/// The mechanisms of a solver that a run leaves out, by their places in its table; none by default.
+/// The set of a solver's disabled mechanisms, by index in its table; empty by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Without(u32);
 
 impl Without {
-    /// These, and the one at `place`.
+    /// Also disables the mechanism at index `place`.
     #[must_use]
     pub const fn and(self, place: usize) -> Self {
         Without(self.0 | 1 << place)
     }
 
-    /// Whether the one at `place` is left out.
+    /// Whether the mechanism at index `place` is disabled.
     pub const fn leaves_out(self, place: usize) -> bool {
         self.0 >> place & 1 == 1
     }
@@ -160,7 +161,7 @@ impl Without {
 
 /// Parameters that several solvers share.
 impl Parameter {
-    /// Share of the overlap that Baumgarte stabilization removes.
+    /// Fraction of the overlap that Baumgarte stabilization removes.
     pub const BAUMGARTE: Parameter = Parameter {
         name: "baumgarte",
         unit: "",
@@ -170,7 +171,7 @@ impl Parameter {
         trials: &[],
     };
 
-    /// Share of the overlap that a position sweep removes.
+    /// Fraction of the overlap that a position sweep removes.
     pub const CORRECTION: Parameter = Parameter {
         name: "correction",
         unit: "",
@@ -206,10 +207,10 @@ impl Parameter {
         trials: &[],
     };
 
-    /// Fastest speed at which overlap is pushed apart, [`MAX_PUSH_SPEED`].
+    /// Maximum speed at which overlapping bodies are pushed apart, [`MAX_PUSH_SPEED`].
     pub const PUSH_SPEED: Parameter = Parameter::push_speed(MAX_PUSH_SPEED);
 
-    /// The same with another default (m/s).
+    /// [`Parameter::PUSH_SPEED`] with another default (m/s).
     pub const fn push_speed(default: f32) -> Parameter {
         Parameter {
             name: "push_speed",
@@ -222,5 +223,5 @@ impl Parameter {
     }
 }
 
-/// Values of a solver's parameters, in the order of its table; zero past its end.
+/// Values of a solver's parameters in the order of its table, padded with zeros.
 pub type Parameters = [f32; MAX_PARAMETERS];

@@ -1,4 +1,4 @@
-//! What each mechanism of a solver is for: the cases, errors and time of runs that leave it out.
+//! The effect of each mechanism of a solver: cases, errors and time of runs that leave it out.
 
 use crate::engine::clock::timed;
 use crate::engine::params::{Mechanism, Without};
@@ -13,32 +13,33 @@ use crate::lab::verify::{self, Case, Lab, VerifyMatrix};
 /// Errors and time of a scene without a mechanism.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct OnScene {
-    /// Its name.
+    /// Name of the scene.
     pub scene: String,
-    /// Mean overlap of the run (m), with all and without; none where the run diverged.
+    /// Mean overlap of the run (m), of the whole solver and without the mechanism; `None` if that run
+    /// diverged.
     pub overlap_m: [Option<f64>; 2],
-    /// Speed in the last second (m/s), likewise.
+    /// Speed in the last second (m/s), in the same order.
     pub rest_speed_m_s: [Option<f64>; 2],
-    /// Time of all steps over that of the whole solver, stepped interleaved (1).
+    /// Time of all steps ÷ that of the whole solver, stepped interleaved (1).
     pub time: f64,
 }
 
-/// A mechanism, and what is lost without it.
+/// A mechanism, and the effect of leaving it out.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Ablated {
-    /// Its name.
+    /// Name of the mechanism.
     pub mechanism: String,
-    /// Its purpose.
+    /// Purpose of the mechanism.
     pub meaning: String,
     /// Lines of code in files of its own.
     pub lines: u32,
     /// The check that needs it: a case, a family of random scenes, or a test.
     pub needed_for: &'static str,
-    /// Cases that pass with it and fail without.
+    /// Cases that pass with the mechanism and fail without it.
     pub lost: Vec<&'static str>,
-    /// Cases that fail with it and pass without.
+    /// Cases that fail with the mechanism and pass without it.
     pub won: Vec<&'static str>,
-    /// Scenes.
+    /// Results by scene.
     pub scenes: Vec<OnScene>,
 }
 
@@ -46,19 +47,20 @@ pub struct Ablated {
 pub struct AblationPlan {
     /// Solver.
     pub solver: &'static Variant,
-    /// Places of mechanisms in its table.
+    /// Indices of mechanisms in the solver's table.
     pub mechanisms: Vec<usize>,
     /// Cases of [`verify`].
     pub cases: Vec<&'static Case>,
-    /// Scenes.
+    /// Names of scenes.
     pub scenes: Vec<String>,
-    /// Steps in each.
+    /// Steps per scene.
     pub steps: u32,
-    /// Threads of cases; scenes run on one.
+    /// Threads for the cases; scenes run on one thread.
     pub threads: usize,
 }
 
-/// Leaves out each mechanism in turn. `tell` is given how many of how many are done, and what runs.
+/// Leaves out each mechanism in turn. `tell` receives the number of finished parts, the total, and the name
+/// of the next part.
 pub fn run(plan: &AblationPlan, tell: &(dyn Fn(usize, usize, &str) + Sync)) -> Result<Vec<Ablated>, Error> {
     let total = plan.mechanisms.len() + 1;
     let passed = |without: Without, done: usize, name: &str| -> Vec<Option<bool>> {
@@ -99,7 +101,7 @@ pub fn run(plan: &AblationPlan, tell: &(dyn Fn(usize, usize, &str) + Sync)) -> R
     Ok(rows)
 }
 
-/// Steps a scene with all mechanisms and without some, in turns.
+/// Steps a scene with all mechanisms and without some, interleaved.
 fn on_scene(plan: &AblationPlan, name: &str, without: Without) -> Result<OnScene, Error> {
     let scene = scenes::load(name)?.scene;
     let build = |without, record_impulses| {
@@ -110,7 +112,7 @@ fn on_scene(plan: &AblationPlan, name: &str, without: Without) -> Result<OnScene
         let seen = Observation::new(&world);
         (world, seen)
     });
-    // Times are of worlds that are not measured: metrics evict the caches.
+    // Times are taken on other worlds, because metrics evict the caches.
     let (mut unseen, mut times, mut diverged) = (pair(false)?, [0.0; 2], [false; 2]);
     for _ in 0..plan.steps {
         for (k, (world, seen)) in both.iter_mut().enumerate() {
@@ -139,7 +141,7 @@ fn on_scene(plan: &AblationPlan, name: &str, without: Without) -> Result<OnScene
     })
 }
 
-/// The rows as two tables: cases, and scenes.
+/// The results as two tables: cases, and scenes.
 pub fn text(rows: &[Ablated]) -> String {
     let mut cases = table(&["without", "lines", "needed for", "cases won", "cases lost"]);
     let mut on_scenes = table(&["without", "scene", "overlap µm", "without", "rest mm/s", "without", "time"]);

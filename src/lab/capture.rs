@@ -1,26 +1,25 @@
-//! Freezing: the contact problem that a world's next step is about to solve.
+//! Freezing: captures the contact problem that a world's next step is about to solve.
 //!
-//! What the world stores is converted exactly, since every `f32` is an `f64`: velocities, inverse
-//! masses and inertias, normals, gaps, friction coefficients, and warm-start impulses. What the
-//! step would compute in `f32` is computed in `f64` from those: the arms r × n and r × t, and the
-//! free velocities
+//! Values stored in the world are converted exactly, since every `f32` is an `f64`: velocities, inverse
+//! masses and inertias, normals, gaps, friction coefficients, and warm-start impulses. Values that the step
+//! would compute in `f32` are computed from those in `f64`: the arms r × n and r × t, and the free velocities
 //!
 //! ```text
 //! v* = v/(1 + h c) + h a,    h = dt.
 //! ```
 //!
-//! So the problem differs from the one in the solver's registers by the rounding of `f32`, and a
+//! The problem therefore differs from the one that the solver computes by the rounding of `f32`, and a
 //! solver's residual on it has a floor of that size.
 //!
-//! Joints are the rows that the step would solve, to the bit: the engine states them, and what it states is converted. Springs
-//! have the coefficients of the whole step. A row that no body answers to is left out, since its impulse moves nothing.
+//! Joints are the rows that the step would solve, bit for bit: the engine provides them, and they are
+//! converted. Springs have the coefficients of the whole step. A row with zero response of both bodies is
+//! left out, since its impulse moves nothing.
 //!
-//! The problem is that of the whole step, as if it were not cut into substeps. Impulses kept from
-//! a run with k substeps are those of its last substep, of length dt/k; a warm start of the whole
-//! step begins with k times as much.
+//! The problem is that of the whole step, without substeps. Impulses kept from a run with k substeps are
+//! those of its last substep, of length dt/k; a warm start of the whole step uses k times as much.
 //!
-//! Bouncing is no part of it: sweeps solve the inelastic problem, and restitution is a pass of its
-//! own after them (see [`crate::engine::constraints::impacts::restitution`]). So `rebound` is zero.
+//! Restitution is not part of the problem: sweeps solve the inelastic problem, and restitution is a separate
+//! pass after them (see [`crate::engine::constraints::impacts::restitution`]). So `rebound` is zero.
 
 use crate::engine::bodies::BodyKind;
 use crate::engine::constraints::records::rows::RowBlock;
@@ -31,7 +30,8 @@ use crate::lab::reference::{
 };
 use glam::Vec2;
 
-/// The problem of the coming step, under this name. Solve it with [`reference`](crate::lab::reference::certify::reference).
+/// The problem of the next step, with this name. Solve it with
+/// [`reference`](crate::lab::reference::certify::reference).
 ///
 /// ```
 /// use simpulse::engine::{solvers, world::Settings};
@@ -45,9 +45,9 @@ use glam::Vec2;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
-/// Finds the contacts of the step, but moves nothing. Static bodies are left out; bodies keep
-/// their order, contacts are sorted by shape pair, joints by type as the step solves them. Where nothing in the scene can turn a body,
-/// inertias are infinite, as they are in the step.
+/// Finds the contacts of the step but moves nothing. Static bodies are left out and the others keep their
+/// order. Contacts are sorted by shape pair, joints by type, as the step solves them. If nothing in the scene
+/// can turn a body, inertias are infinite, as they are in the step.
 pub fn capture(world: &mut World, name: impl Into<String>) -> ContactProblem {
     world.find_contacts();
     let mut bodies = Vec::new();
@@ -128,7 +128,7 @@ fn body(world: &World, i: usize) -> ProblemBody {
     ProblemBody { inv_mass, inv_inertia, velocity, free_velocity }
 }
 
-/// Everything of a point but whose it is.
+/// All values of a contact point except its bodies and manifold.
 fn row(contact: &Contact, point: &ManifoldPoint, substeps: f64) -> ProblemContact {
     let n = contact.manifold.normal;
     let t = Vec2::new(n.y, -n.x);

@@ -1,17 +1,18 @@
-//! The one error of the crate's edge: bad scenes, bad settings, files.
+//! The one error type at the edge of the crate: bad scenes, bad settings, files.
 //!
 //! Hot loops are infallible. A simulation that diverges is an *outcome*
 //! ([`crate::engine::world::Divergence`]), not an error.
 
 use std::path::PathBuf;
 
-/// Longest text of a file that a message repeats (characters).
+/// Longest text from a file or user that a message repeats (characters).
 const LONGEST: usize = 400;
 
-/// Longest name for which a similar one is looked for (bytes): memory and time grow with it.
+/// Longest name for which a similar one is searched (bytes). Memory and time grow with its length.
 pub(in crate::lab) const LONGEST_MISSPELT: usize = 100;
 
-/// Errors of the caller; each variant carries the offending value. Every message is one line, whatever the value is.
+/// Errors caused by input; each variant carries the offending value. Every message is one line, whatever the
+/// value is.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A file could not be read or written.
@@ -22,7 +23,7 @@ pub enum Error {
         /// The system's error.
         source: std::io::Error,
     },
-    /// A file is not of the expected form.
+    /// A file does not have the expected format.
     #[error("{}: {}", plain(&path.to_string_lossy()), plain(message))]
     Format {
         /// The file.
@@ -30,24 +31,24 @@ pub enum Error {
         /// The reason, with line and column if known.
         message: String,
     },
-    /// A value is out of its range.
+    /// A value is invalid.
     #[error("{}: {}", plain(place), plain(message))]
     Invalid {
-        /// Where the value stands, for example `bodies[3].shapes[0].density`.
+        /// Where the value is, for example `bodies[3].shapes[0].density`.
         place: String,
         /// The reason, with the value.
         message: String,
     },
-    /// A name that is not in its table.
+    /// A name is not in its table.
     #[error("unknown {kind} '{}'{}{}", plain(name), suggestion(nearest), list(known))]
     UnknownName {
-        /// `scene`, `solver`, …
+        /// Kind of name: `scene`, `solver`, …
         kind: &'static str,
         /// The name as given.
         name: String,
-        /// The nearest name there is.
+        /// The most similar known name, if there is one.
         nearest: Option<String>,
-        /// All names there are.
+        /// All known names.
         known: Vec<String>,
     },
 }
@@ -62,13 +63,13 @@ fn suggestion(nearest: &Option<String>) -> String {
 /// Longest list of names that a message repeats (characters).
 const LONGEST_LIST: usize = 450;
 
-/// All names, if they are few enough.
+/// The list of names, unless it is too long.
 fn list(known: &[String]) -> String {
     let names = known.join(", ");
     if names.is_empty() || names.len() > LONGEST_LIST { String::new() } else { format!(" [{names}]") }
 }
 
-/// The text with control characters as escapes, and without the middle of what is too long.
+/// The text with control characters escaped; the middle of a long text is replaced by its length.
 pub(in crate::lab) fn plain(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     for c in text.chars() {
@@ -78,7 +79,7 @@ pub(in crate::lab) fn plain(text: &str) -> String {
     if count <= LONGEST {
         return plain;
     }
-    // What is wrong mostly stands before the value, line and column behind it.
+    // The cause is usually before the value, line and column after it.
     let (head, tail) = (LONGEST - LONGEST / 4, LONGEST / 4);
     let at = |n: usize| plain.char_indices().nth(n).map_or(plain.len(), |(i, _)| i);
     let (head, left_out, tail) = (&plain[..at(head)], count - head - tail, &plain[at(count - tail)..]);
@@ -86,7 +87,7 @@ pub(in crate::lab) fn plain(text: &str) -> String {
 }
 
 impl Error {
-    /// The same about a value inside `place`; other errors know where they are.
+    /// Adds `place` in front of the place of an invalid value. Other errors are unchanged.
     pub(in crate::lab) fn within(self, place: &str) -> Self {
         match self {
             Error::Invalid { place: inner, message } => {
@@ -109,14 +110,14 @@ impl From<crate::engine::error::Error> for Error {
 }
 
 impl Error {
-    /// An out-of-range value at `place`.
+    /// An invalid value at `place`.
     pub fn invalid(place: impl Into<String>, message: impl Into<String>) -> Self {
         Error::Invalid { place: place.into(), message: message.into() }
     }
 
-    /// An unknown `name`, with the nearest of `known` as the suggestion.
+    /// An unknown `name`, with the most similar of `known` as a suggestion.
     pub fn unknown<'a>(kind: &'static str, name: &str, known: impl Iterator<Item = &'a str>) -> Self {
-        // Of a name that is long as it is shown all of the message is the name.
+        // For a name that is long, or long once escaped, no other names are listed.
         let is_short = name.len() <= LONGEST_MISSPELT && plain(name).len() <= LONGEST_MISSPELT;
         let known: Vec<&str> = known.filter(|_| is_short).collect();
         let nearest = known
@@ -151,7 +152,7 @@ mod tests {
         );
         assert_eq!(plain(&format!("{head}{tail}")), format!("{head}{tail}"));
         assert!(plain(&"\u{1}".repeat(5000)).chars().count() < 430);
-        // With a matrix of distances this would take a gigabyte.
+        // A distance matrix of this size would take a gigabyte.
         assert!(
             Error::unknown("scene", &"a".repeat(30_000_000), ["arch"].into_iter()).to_string().len() < 500
         );

@@ -1,25 +1,25 @@
 //! Estimates before a run: time and memory from bodies, steps and settings.
 //!
-//! Figures are of pyramids (three contacts of two points per body) on one Zen 5 core, rounded; scenes with
-//! fewer contacts take a fraction of it, other machines a few times as much. That is enough to tell
-//! seconds from hours and megabytes from terabytes.
+//! The figures are for pyramids (three contacts of two points per body) on one Zen 5 core, rounded. Scenes
+//! with fewer contacts take a fraction of that, other machines a few times as much. This is accurate enough
+//! to tell seconds from hours and megabytes from terabytes.
 
 use super::error::Error;
 
-/// Everything of a step but its sweeps, per body (ns).
+/// Time of a step without its sweeps, per body (ns).
 const STEP_NS: f64 = 350.0;
-/// A sweep at one lane, per body (ns).
+/// Time of a sweep at one lane, per body (ns).
 const SWEEP_NS: f64 = 60.0;
-/// Sweeps become faster by this power of the lane width.
+/// Sweeps are faster by the lane width to this power.
 const LANE_POWER: f64 = 0.6;
-/// Measuring the errors of a step, per body (ns).
+/// Time of measuring the errors of a step, per body (ns).
 const ERRORS_NS: f64 = 1500.0;
-/// A world, per body (B).
+/// Memory of a world, per body (B).
 const WORLD_BYTES: f64 = 3000.0;
-/// A scene, and what measuring its errors keeps, per body (B).
+/// Memory of a scene and of measuring its errors, per body (B).
 const ERRORS_BYTES: f64 = 2500.0;
 
-/// Longest time (s) and most memory (B) that need no word.
+/// Longest time (s) and largest memory (B) for which no estimate is printed.
 const LONG: f64 = 60.0;
 const LARGE: f64 = 4.0 * 1024.0 * 1024.0 * 1024.0;
 
@@ -28,11 +28,11 @@ const LARGE: f64 = 4.0 * 1024.0 * 1024.0 * 1024.0;
 pub struct Estimate {
     /// Wall-clock time (s).
     pub seconds: f64,
-    /// At its greatest (B).
+    /// Peak memory (B).
     pub bytes: f64,
 }
 
-/// Time of one step of so many bodies (s).
+/// Time of one step with this number of bodies (s).
 pub fn step(bodies: usize, sweeps: u32, lanes: usize) -> f64 {
     1e-9 * bodies as f64 * (STEP_NS + SWEEP_NS * f64::from(sweeps) / (lanes as f64).powf(LANE_POWER))
 }
@@ -42,21 +42,22 @@ pub fn errors(bodies: usize) -> f64 {
     1e-9 * bodies as f64 * ERRORS_NS
 }
 
-/// Memory of so many worlds of one scene, and of measuring the errors of `measured` of them at once (B).
+/// Memory of `worlds` worlds of one scene, or of measuring the errors of `measured` worlds at once, whichever
+/// is larger (B).
 pub fn memory(bodies: usize, worlds: usize, measured: usize) -> f64 {
     let measuring = measured as f64 * (WORLD_BYTES + ERRORS_BYTES);
     bodies as f64 * (worlds as f64 * WORLD_BYTES).max(measuring)
 }
 
 impl Estimate {
-    /// One after the other: times add up, memory is that of the largest.
+    /// Both runs in sequence: times add up, memory is the larger of the two.
     pub fn then(self, next: Estimate) -> Estimate {
         Estimate { seconds: self.seconds + next.seconds, bytes: self.bytes.max(next.bytes) }
     }
 
-    /// What to say before something that takes this: nothing where it is short and small.
+    /// A message to print before a run with this estimate; empty if the run is short and small.
     ///
-    /// Errors: more memory than `free` (B), where that is known.
+    /// Errors: the memory exceeds `free` (B), if that is known.
     pub fn note(&self, what: &str, free: Option<f64>) -> Result<String, Error> {
         if let Some(free) = free.filter(|&free| self.bytes > free) {
             let message =
@@ -71,7 +72,7 @@ impl Estimate {
 }
 
 impl Estimate {
-    /// The same where memory is no question.
+    /// The same for time only.
     pub fn time_note(&self, what: &str) -> String {
         if self.seconds <= LONG {
             String::new()
@@ -81,7 +82,7 @@ impl Estimate {
     }
 }
 
-/// Bytes that the system can still give; none where it does not say.
+/// Memory available from the system (B); `None` if unknown.
 pub fn free_memory() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;

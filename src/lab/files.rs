@@ -1,4 +1,4 @@
-//! Result files: all or nothing.
+//! Result files, written completely or not at all.
 //!
 //! A regular file is written under a temporary name in its own folder and renamed when it is complete, so an
 //! interrupted run leaves no partial file. Links are followed, and their target is replaced. Devices, pipes and
@@ -15,38 +15,38 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::NamedTempFile;
 
-/// Links that are followed before it is a circle.
+/// Most links followed before they count as a cycle.
 const MOST_LINKS: usize = 40;
 
 static TEMPORARIES: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Folders that were made for files that are not there yet.
+/// Folders created for files that do not exist yet.
 static MADE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// A file that does not exist under its name until [`Pending::commit`].
+/// A file that appears under its name only with [`Pending::commit`].
 pub struct Pending {
     file: BufWriter<WriteTarget>,
     path: PathBuf,
 }
 
-/// Where the bytes go.
+/// Target of the written bytes.
 enum WriteTarget {
-    /// To a temporary file, which takes this name when it is whole.
+    /// A temporary file, which is renamed to this path when complete.
     Whole(Temporary, PathBuf),
-    /// Through, at once.
+    /// An existing file, pipe or device, written directly.
     Through(File),
-    /// To standard output, at once.
+    /// Standard output, written directly.
     StandardOutput,
 }
 
 impl Pending {
-    /// Begins the file `path`, in a folder that exists.
+    /// Starts the file `path`, in an existing folder.
     pub fn new(path: &Path) -> Result<Self, Error> {
         let target = WriteTarget::of(path).map_err(Error::io(path))?;
         Ok(Pending { file: BufWriter::new(target), path: path.into() })
     }
 
-    /// Gives the file its name.
+    /// Completes the file and gives it its name.
     pub fn commit(self) -> Result<(), Error> {
         let Pending { file, path } = self;
         let mut target = file.into_inner().map_err(|e| Error::io(&path)(e.into_error()))?;
@@ -75,7 +75,8 @@ impl WriteTarget {
         let (place, own) = followed(path)?;
         match std::fs::metadata(&place) {
             Ok(found) if found.is_dir() => Err(ErrorKind::IsADirectory.into()),
-            // A regular file that somebody holds open under a name of the system's is not replaced either.
+            // Write directly to devices and pipes, and to a regular file that is open under a system name
+            // such as `/dev/fd/3`.
             Ok(found) if !found.is_file() || !own => {
                 Ok(WriteTarget::Through(OpenOptions::new().append(true).open(&place)?))
             }
@@ -102,12 +103,12 @@ impl Write for WriteTarget {
     }
 }
 
-/// Whether `path` means standard output: then nothing else may be printed there.
+/// Whether `path` is standard output. If so, nothing else may be printed there.
 pub fn is_standard_output(path: &Path) -> bool {
     ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"].iter().any(|name| path == Path::new(name))
 }
 
-/// Whether two paths mean the same file.
+/// Whether two paths refer to the same file.
 pub fn same_file(a: &Path, b: &Path) -> bool {
     let place = |path: &Path| match followed(path) {
         Ok((place, _)) => {
@@ -119,8 +120,8 @@ pub fn same_file(a: &Path, b: &Path) -> bool {
     (is_standard_output(a) && is_standard_output(b)) || place(a) == place(b)
 }
 
-/// Where the links of `path` lead, there or not, and whether that is a place of the user's: not one of the
-/// system's, such as `/dev/fd/3`, whose links are not paths.
+/// Target of the links of `path`, whether it exists or not, and whether it is an ordinary path: not one of
+/// the system's, such as `/dev/fd/3`, whose links are not paths.
 fn followed(path: &Path) -> std::io::Result<(PathBuf, bool)> {
     const OF_THE_SYSTEM: [&str; 5] = ["/proc", "/dev/fd", "/dev/stdin", "/dev/stdout", "/dev/stderr"];
     let of_the_system = |path: &Path| OF_THE_SYSTEM.iter().any(|folder| path.starts_with(folder));
@@ -144,23 +145,23 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// A file under a temporary name, which is in the list while the file is there.
+/// A file under a temporary name. The name is in the list as long as the file exists.
 struct Temporary {
-    /// None once it has its own name.
+    /// `None` once the file has its final name.
     file: Option<NamedTempFile>,
     name: PathBuf,
 }
 
 impl Temporary {
-    /// One that others may read once it has its name, as the user's mask allows.
+    /// A new temporary file. Its permissions follow the user's mask, so that others can read the final file.
     fn in_folder(folder: &Path) -> std::io::Result<Self> {
         let mut builder = tempfile::Builder::new();
         builder.prefix(".simpulse-");
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        // Locked before the file exists: a signal finds it in the list or not at all.
+        // Locked before the file exists, so that a signal finds it in the list or not at all.
         let mut list = temporaries();
-        // Its message names the temporary file, which nobody asked for.
+        // The original message contains the temporary name, which means nothing to the user.
         let file = builder.tempfile_in(folder).map_err(plain)?;
         let name = file.path().to_path_buf();
         list.push(name.clone());
@@ -187,7 +188,7 @@ impl Drop for Temporary {
     }
 }
 
-/// An error of the system without the path that `tempfile` adds.
+/// A system error without the path that `tempfile` adds.
 fn plain(error: std::io::Error) -> std::io::Error {
     match error.get_ref().and_then(|inner| std::error::Error::source(inner)) {
         Some(source) => match source.downcast_ref::<std::io::Error>().and_then(|e| e.raw_os_error()) {
@@ -202,47 +203,47 @@ fn temporaries() -> MutexGuard<'static, Vec<PathBuf>> {
     TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes what is not whole, for a process that ends at once: no other file can be begun after it.
+/// Removes incomplete files before the process exits. No other file can be started afterwards.
 pub fn remove_temporaries() {
     let list = temporaries();
     for path in list.iter() {
         let _ = std::fs::remove_file(path);
     }
-    // Only what is empty can be removed.
+    // Only empty folders can be removed.
     for folder in MADE.lock().unwrap_or_else(PoisonError::into_inner).iter() {
         let _ = std::fs::remove_dir(folder);
     }
     std::mem::forget(list);
 }
 
-/// Makes the folder if need be, and makes sure that a file can be written there. A folder that was made goes
-/// again with [`remove_temporaries`] if nothing has been written into it.
+/// Creates the folder if necessary, and checks that a file can be written there. If the folder is new and
+/// still empty, [`remove_temporaries`] removes it again.
 pub fn prepare_folder(folder: &Path) -> Result<(), Error> {
     let missing: Vec<PathBuf> = folder
         .ancestors()
         .take_while(|f| !f.as_os_str().is_empty() && !f.exists())
         .map(PathBuf::from)
         .collect();
-    // The innermost first, as they can be removed.
+    // Innermost first, the order in which they can be removed.
     MADE.lock().unwrap_or_else(PoisonError::into_inner).extend(missing);
     std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
     Temporary::in_folder(folder).map_err(Error::io(folder))?;
     Ok(())
 }
 
-/// Name of the file that says that a folder is in use.
+/// Name of the file that marks a folder as in use.
 const LOCK: &str = ".simpulse.lock";
 
-/// A folder of results that nobody else writes into, until it is dropped or the process ends.
+/// Exclusive use of a folder of results, until it is dropped or the process ends.
 #[derive(Debug)]
 pub struct Lock {
     path: PathBuf,
-    /// The system lets go of it when the process ends, however it does.
+    /// The system releases this lock when the process ends, for whatever reason.
     file: Option<File>,
 }
 
 impl Lock {
-    /// Errors: a folder that another process has, or one that cannot be written.
+    /// Locks a folder. Errors: the folder is locked by another process, or cannot be written.
     pub fn of(folder: &Path) -> Result<Self, Error> {
         let path = folder.join(LOCK);
         let file = OpenOptions::new().create(true).truncate(false).write(true).open(&path);
@@ -253,7 +254,7 @@ impl Lock {
                 let message = "another study is writing there; give another folder with --out";
                 return Err(Error::invalid(folder.display().to_string(), message));
             }
-            // A system without locks: two studies are the user's to keep apart.
+            // On a system without file locks, users must keep two studies apart themselves.
             Err(std::fs::TryLockError::Error(_)) => {}
         }
         temporaries().push(path.clone());
@@ -269,10 +270,11 @@ impl Drop for Lock {
     }
 }
 
-/// Paths that are no text, with the text that stands for each.
+/// Paths that are not valid UTF-8, with the text that represents each.
 static PATHS: Mutex<Vec<(String, PathBuf)>> = Mutex::new(Vec::new());
 
-/// The text of a path: names of scenes are text, and a system's paths need not be. [`path_of`] knows the path again.
+/// Text that represents a path: names of scenes are text, but a path need not be valid UTF-8. [`path_of`]
+/// reverses this.
 pub fn text_of(path: OsString) -> String {
     let path = match path.into_string() {
         Ok(text) => return text,
@@ -280,7 +282,7 @@ pub fn text_of(path: OsString) -> String {
     };
     let mut paths = PATHS.lock().unwrap_or_else(PoisonError::into_inner);
     let mut text = path.to_string_lossy().into_owned();
-    // Another path may look the same.
+    // Another path may have the same text.
     while paths.iter().any(|(known, other)| *known == text && *other != path) {
         text.insert(0, char::REPLACEMENT_CHARACTER);
     }
@@ -288,7 +290,7 @@ pub fn text_of(path: OsString) -> String {
     text
 }
 
-/// The path that a text stands for.
+/// The path that a text represents.
 pub fn path_of(text: &str) -> PathBuf {
     let paths = PATHS.lock().unwrap_or_else(PoisonError::into_inner);
     paths.iter().find(|(known, _)| known == text).map_or_else(|| text.into(), |(_, path)| path.clone())

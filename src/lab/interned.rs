@@ -1,7 +1,7 @@
-//! Names that live as long as the program, read from records.
+//! Names that live as long as the program.
 //!
-//! Names of solvers, quantities and units are `&'static str` where they are made. Reading a record returns the same
-//! type: every name is stored once, and there are few.
+//! Names of solvers, quantities and units are `&'static str` in code. Reading a record returns the same type:
+//! each distinct name is stored once, and there are few of them.
 
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeSet;
@@ -9,10 +9,10 @@ use std::sync::{Mutex, PoisonError};
 
 static NAMES: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
 
-/// A name that is kept. An alias, because serde takes a reference that it sees for one into its input.
+/// A stored name. This is an alias because serde takes any visible reference for one into its input.
 pub type Name = &'static str;
 
-/// The name, kept.
+/// Stores the name unless it is stored already.
 pub fn interned(name: &str) -> &'static str {
     let mut names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(known) = names.get(name) {
@@ -23,7 +23,7 @@ pub fn interned(name: &str) -> &'static str {
     kept
 }
 
-/// For `#[serde(deserialize_with)]`.
+/// Reads a name; for `#[serde(deserialize_with)]`.
 pub fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<&'static str, D::Error> {
     Ok(interned(&String::deserialize(deserializer)?))
 }

@@ -66,7 +66,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Save a world as JSON and load it; it continues with the same bits:
+//! Save a world as JSON and load it; the copy continues bit-identically:
 //!
 //! ```
 //! use simpulse::engine::{solvers, world::{Settings, World}};

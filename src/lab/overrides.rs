@@ -1,7 +1,7 @@
 //! Solver parameters by name: `contact_hertz=60`.
 //!
-//! Several solvers often run together, so an override applies to those that have the parameter, and must apply to at
-//! least one.
+//! Several solvers often run together. An override applies to those that have the parameter, and must apply
+//! to at least one.
 
 use crate::engine::params::Parameters;
 use crate::engine::solvers::{VARIANTS, Variant};
@@ -11,9 +11,9 @@ use std::str::FromStr;
 /// A parameter's name and its value.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Override {
-    /// As in [`Variant::parameters`].
+    /// Name of the parameter, as in [`Variant::parameters`].
     pub name: String,
-    /// In the parameter's own unit.
+    /// Value in the parameter's own unit.
     pub value: f32,
 }
 
@@ -28,7 +28,7 @@ impl FromStr for Override {
     }
 }
 
-/// Refuses an override that none of the solvers has, or a value out of its range.
+/// Checks overrides. Errors: a parameter that none of the solvers has, a value out of its range.
 pub fn check(solvers: &[&'static Variant], overrides: &[Override]) -> Result<(), Error> {
     for given in overrides {
         if solvers.iter().all(|v| v.parameter(&given.name).is_err()) {
@@ -47,7 +47,7 @@ pub fn check(solvers: &[&'static Variant], overrides: &[Override]) -> Result<(),
     solvers.iter().try_for_each(|v| values(v, overrides).map(drop))
 }
 
-/// A line for each override that some of the solvers do not have, and which they are.
+/// A line for each override that some of the solvers do not have, with the names of these solvers.
 pub fn partly(solvers: &[&'static Variant], overrides: &[Override]) -> String {
     let line = |given: &Override| {
         let without: Vec<&str> =
@@ -57,7 +57,7 @@ pub fn partly(solvers: &[&'static Variant], overrides: &[Override]) -> String {
     overrides.iter().filter_map(line).collect()
 }
 
-/// The values of `variant`'s parameters under those overrides that it has.
+/// The parameter values of `variant` with the overrides that apply to it.
 pub fn values(variant: &Variant, overrides: &[Override]) -> Result<Parameters, Error> {
     let mut values = variant.defaults();
     for Override { name, value } in overrides.iter().filter(|o| variant.parameter(&o.name).is_ok()) {
@@ -66,28 +66,28 @@ pub fn values(variant: &Variant, overrides: &[Override]) -> Result<Parameters, E
     Ok(values)
 }
 
-/// Differences from the standard values, for tables: `contact_hertz 60 Hz`; empty where nothing does.
+/// Differences from the default values, for tables: `contact_hertz 60 Hz`; empty if there are none.
 pub fn brief(variant: &Variant, values: &Parameters) -> String {
     let changed = variant.parameters.iter().zip(values).filter(|(p, value)| p.default != **value);
     let texts = changed.map(|(p, value)| format!("{} {value} {}", p.name, p.unit).trim_end().to_string());
     texts.collect::<Vec<_>>().join(" ")
 }
 
-/// Differences from the standard values, for [`of_words`].
+/// Differences from the default values, in the format of [`of_words`].
 pub fn changed(variant: &Variant, values: &Parameters) -> String {
     let changed = variant.parameters.iter().zip(values).filter(|(p, value)| p.default != **value);
     changed.map(|(p, value)| format!("{}={value}", p.name)).collect::<Vec<_>>().join(" ")
 }
 
-/// All values in words: `contact_hertz=30 contact_damping_ratio=10`.
+/// All values as text: `contact_hertz=30 contact_damping_ratio=10`.
 pub fn words(variant: &Variant, values: &Parameters) -> String {
     let each = variant.parameters.iter().zip(values).map(|(p, value)| format!("{}={value}", p.name));
     each.collect::<Vec<_>>().join(" ")
 }
 
-/// Parses the text of [`words`]; values that are not named are the standard ones.
+/// Parses the text of [`words`]. Values that are not listed are the defaults.
 ///
-/// Errors: as [`check`].
+/// Errors: an unknown parameter, a value out of its range.
 pub fn of_words(variant: &Variant, words: &str) -> Result<Parameters, Error> {
     let mut values = variant.defaults();
     for word in words.split_whitespace() {
@@ -103,7 +103,7 @@ pub fn by_name(variant: &Variant, values: &Parameters) -> serde_json::Map<String
     each.map(|(p, &value)| (p.name.to_string(), decimal(value))).collect()
 }
 
-/// An `f32` as the shortest decimal that names it.
+/// An `f32` as the shortest decimal that identifies it.
 fn decimal(value: f32) -> serde_json::Value {
     value.to_string().parse::<f64>().map_or(serde_json::Value::Null, Into::into)
 }
@@ -127,7 +127,7 @@ mod tests {
             let mut values = variant.defaults();
             values[..variant.parameters.len()].iter_mut().for_each(|v| *v *= 0.7);
             let words = words(variant, &values);
-            // Values below a range are refused, others come back with the same bits.
+            // Values below a range are rejected; the others are read back with the same bits.
             assert!(of_words(variant, &words).map_or(true, |back| back == values), "{words}");
         }
         assert_eq!(of_words(soft, "contact_hertz=60").unwrap(), values(soft, &list).unwrap());

@@ -1,9 +1,9 @@
-//! Formatting of numbers with three digits and an SI prefix, and parsing.
+//! Formatting of numbers with three digits and an SI prefix, and parsing of numbers with units.
 
 use crate::engine::lanes::native_width;
 use crate::lab::error::Error;
 
-/// `value` of a unit with an SI prefix: `1.23 mm`, `45.6 µm`, `0 m`.
+/// `value` in a unit with an SI prefix: `1.23 mm`, `45.6 µm`, `0 m`.
 pub fn si(value: f64, unit: &str) -> String {
     const PREFIXES: [(f64, &str); 8] =
         [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p")];
@@ -11,16 +11,16 @@ pub fn si(value: f64, unit: &str) -> String {
     if size < 1e-12 {
         return format!("0 {unit}").trim_end().to_string();
     }
-    // A share of one has no milli-ones.
+    // Ratios take no SI prefix.
     if unit.is_empty() || unit == "1" {
         return ratio(value);
     }
-    // 0.9995 of a prefix would be written 1000 of the next one down.
+    // Without the 0.9995, a value just below a prefix would be printed as 1000 of the next smaller one.
     let (scale, prefix) = PREFIXES.into_iter().find(|p| size >= 0.9995 * p.0).unwrap_or(PREFIXES[7]);
     format!("{} {prefix}{unit}", digits(value / scale))
 }
 
-/// The same without zeros behind the point: `1 mm`, `2.5 s`.
+/// The same without trailing zeros: `1 mm`, `2.5 s`.
 pub fn si_short(value: f64, unit: &str) -> String {
     let text = si(value, unit);
     let Some((number, unit)) = text.split_once(' ') else { return text };
@@ -35,7 +35,7 @@ pub fn ratio(value: f64) -> String {
     if value == 0.0 { "0".to_string() } else { format!("{value:.1e}") }
 }
 
-/// Three digits: `1.23`, `12.3`, `1234`.
+/// A number with three digits: `1.23`, `12.3`, `1234`.
 pub fn digits(value: f64) -> String {
     let decimals = match value.abs() {
         x if x < 9.995 => 2,
@@ -45,7 +45,7 @@ pub fn digits(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
-/// So many of something: `1 scene`, `2 scenes`.
+/// A count with its noun: `1 scene`, `2 scenes`.
 pub fn count(number: usize, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }
@@ -55,14 +55,14 @@ pub fn bodies(number: usize) -> String {
     if number == 1 { "1 body".to_string() } else { format!("{number} bodies") }
 }
 
-/// A lane width in words: `1 lane`, `8 lanes`, `16 lanes, emulated` where the build has no
-/// instructions that wide.
+/// A lane width as text: `1 lane`, `8 lanes`; `16 lanes, emulated` if the build has no instructions that
+/// wide.
 pub fn lanes(lanes: usize) -> String {
     let emulated = if is_emulated(lanes) { ", emulated" } else { "" };
     count(lanes, "lane") + emulated
 }
 
-/// Whether lanes of this width are wider than what this build has instructions for.
+/// Whether lanes of this width are wider than this build has instructions for.
 pub fn is_emulated(lanes: usize) -> bool {
     lanes > native_width().lanes()
 }
@@ -73,10 +73,10 @@ const LENGTHS: [(&str, f64); 7] =
 const TIMES: [(&str, f64); 6] =
     [("ns", 1e-9), ("us", 1e-6), ("µs", 1e-6), ("μs", 1e-6), ("ms", 1e-3), ("s", 1.0)];
 
-/// A value of the option `option` in `unit`: lengths (`m`) and times (`s`) need one of their
-/// units behind the number, other quantities may have just their own.
+/// Parses the value of option `option`, in `unit`. Lengths (`m`) and times (`s`) must be followed by one of
+/// their units; other quantities may be followed by `unit` or by nothing.
 ///
-/// Errors: what is no number ≥ 0, or has another unit.
+/// Errors: not a number ≥ 0, or another unit.
 pub fn quantity(option: &str, text: &str, unit: &str) -> Result<f64, Error> {
     let refused = |why: String| Err(Error::invalid(option, format!("'{text}' {why}")));
     let own = [(unit, 1.0), ("", 1.0)];
@@ -86,7 +86,7 @@ pub fn quantity(option: &str, text: &str, unit: &str) -> Result<f64, Error> {
         _ => &own,
     };
     let text = text.trim();
-    // What may stand in a number ends at the first letter that is not an exponent.
+    // The number is the longest prefix that parses as one, so an exponent belongs to it.
     let is_number = |part: &str| part.trim().parse::<f64>().is_ok();
     let Some(split) = (1..=text.len()).rev().find(|&i| text.is_char_boundary(i) && is_number(&text[..i]))
     else {
@@ -109,7 +109,7 @@ pub fn quantity(option: &str, text: &str, unit: &str) -> Result<f64, Error> {
     }
 }
 
-/// Text in lines of at most `most` characters, broken between words where there are any.
+/// Text in lines of at most `most` characters, broken between words; a longer word has a line of its own.
 pub fn wrapped(text: &str, most: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {

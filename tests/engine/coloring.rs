@@ -5,7 +5,7 @@ use simpulse::engine::coloring::{Coloring, EXEMPT, MAX_COLORS, OVERFLOW};
 
 const BODIES: usize = 24;
 
-/// Edges at each body that needs exclusivity.
+/// Number of edges at each body. Exempt sides do not count.
 fn degrees(edges: &[[u32; 2]]) -> [usize; BODIES] {
     let mut degrees = [0; BODIES];
     for &[a, b] in edges {
@@ -18,7 +18,7 @@ fn degrees(edges: &[[u32; 2]]) -> [usize; BODIES] {
     degrees
 }
 
-/// Body pairs, some sides exempt; few bodies, so that long lists overflow.
+/// Body pairs, some with exempt sides. There are few bodies, so long lists overflow.
 fn graph() -> impl Strategy<Value = Vec<[u32; 2]>> {
     let body = || prop_oneof![8 => 0u32..BODIES as u32, 1 => Just(EXEMPT)];
     let edge = (body(), body()).prop_filter_map("a body is no neighbor of itself", |(a, b)| {
@@ -63,8 +63,8 @@ proptest! {
         }
     }
 
-    /// At its turn an edge sees at most deg(a) − 1 + deg(b) − 1 others, which
-    /// bounds its color, and overflow needs all 64 colors taken.
+    /// When an edge is colored, it sees at most deg(a) − 1 + deg(b) − 1 others. This bounds its color, and
+    /// overflow requires all 64 colors in use.
     #[test]
     fn colors_within_the_greedy_bound(edges in graph()) {
         let mut coloring = Coloring::new();
@@ -115,7 +115,7 @@ fn a_star_overflows() {
     coloring.assign(&edges, 1001);
     assert_eq!(coloring.colors(), MAX_COLORS);
     assert_eq!(coloring.overflow(), (64..1000).collect::<Vec<u32>>());
-    // The overflow of the star's center says nothing about its points.
+    // Overflow at the star's center does not affect the colors of its points.
     let mut more = edges;
     more.push([999, 1000]);
     coloring.assign(&more, 1001);
@@ -133,7 +133,7 @@ fn exempt_sides_share_a_color() {
     assert_eq!(coloring.color_of(), [0, 0], "a body past the end is exempt");
 }
 
-/// A path takes its colors in turn: by hand.
+/// A path uses its colors in turn. The expected colors are computed by hand.
 #[test]
 fn a_path() {
     let mut coloring = Coloring::new();

@@ -1,4 +1,4 @@
-//! Newton's method of `sap`, step by step.
+//! Convergence of Newton's method in `sap`.
 
 use simpulse::engine::bodies::{BodyDef, ShapeDef};
 use simpulse::engine::clock::Phase;
@@ -37,7 +37,8 @@ fn step(passes: &mut Passes<'_>) {
     passes.end_substep(0);
 }
 
-/// A pyramid of boxes, thrown onto the ground with a slant, without warm starting.
+/// Residual after each Newton step for a pyramid of boxes thrown obliquely onto the ground, without warm
+/// starting.
 fn thrown_pyramid(base: u32) -> Vec<f64> {
     let mut world = World::new(Settings::new(&WATCHED));
     world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(50.0, 1.0).unwrap())).unwrap();
@@ -53,8 +54,8 @@ fn thrown_pyramid(base: u32) -> Vec<f64> {
     HISTORY.with_borrow(Clone::clone)
 }
 
-/// `todorov2014` has a few iterations, whatever the size. From zero it takes more here: contacts close level by level, one
-/// step each, and once more where friction turns.
+/// `todorov2014` reports a few iterations, whatever the size. Started from zero, the method takes more here:
+/// contacts close one level per step, with one more step per level where friction changes direction.
 #[test]
 fn newton_s_method_ends_at_rounding_after_two_steps_per_level() {
     for base in [5, 10, 20] {

@@ -1,4 +1,4 @@
-//! Joints: what they hold, by hand-made truths.
+//! Joints against hand-computed reference values.
 
 use simpulse::engine::bodies::{BodyDef, BodyHandle, ShapeDef};
 use simpulse::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
@@ -14,7 +14,7 @@ fn empty(solver: &'static Variant) -> (World, BodyHandle) {
     (world, ground)
 }
 
-/// Capsules of 1 m from (0, 20) to the right, with a disc at the end.
+/// A chain of 1 m capsules from (0, 20) to the right, with a disc at its end.
 fn chain(world: &mut World, ground: BodyHandle, links: usize, radius: f32) -> Vec<JointHandle> {
     let mut before = ground;
     let mut joints = vec![];
@@ -33,7 +33,7 @@ fn chain(world: &mut World, ground: BodyHandle, links: usize, radius: f32) -> Ve
     joints
 }
 
-/// The widest gap of these joints (m).
+/// The largest gap of these joints (m).
 fn widest_gap(world: &World, joints: &[JointHandle]) -> f64 {
     joints.iter().map(|&joint| world.joint_state(joint).unwrap().gap).fold(0.0, f64::max)
 }
@@ -104,15 +104,15 @@ fn joints_keep_the_momenta_of_a_free_chain() {
             world.step().unwrap();
         }
         let after = momenta(&world);
-        // Masses of 5 and 16 kg at some m/s and 20 m: rounding of positions and speeds over 1680 substeps.
+        // Masses of 5 and 16 kg at a few m/s and 20 m: rounding of positions and speeds over 1680 substeps.
         for (k, scale) in [50.0, 50.0, 1000.0].into_iter().enumerate() {
             assert!((after[k] - before[k]).abs() < 2e-5 * scale, "{solver}: {before:?}, then {after:?}");
         }
     }
 }
 
-/// A joint that is set to what it is changes nothing, impulses included; one that is moved to another body holds that one as
-/// a new joint would.
+/// Setting a joint to its current definition changes nothing, impulses included. A joint moved to another
+/// body holds that body as a new joint would.
 #[test]
 fn a_joint_is_changed_between_steps() {
     for solver in ["shim", "soft_step", "pgs"] {
@@ -156,7 +156,7 @@ fn a_joint_is_changed_between_steps() {
     }
 }
 
-/// Beside a chain of six links, and beside a ball on one.
+/// The disturbance is far from a chain of six links, and from a ball on a single joint.
 #[test]
 fn joints_far_away_that_come_and_go_change_no_bit() {
     let run = |links: usize, disturbed: bool| {
@@ -211,7 +211,7 @@ fn which_body_is_a_does_not_matter_to_a_hinge() {
         world.bodies.center(rod.index())
     };
     let (one, other) = (fall(false), fall(true));
-    // Rounding over 1680 substeps, at speeds of some m/s.
+    // Rounding over 1680 substeps, at speeds of a few m/s.
     assert!((0..2).all(|k| (one[k] - other[k]).abs() < 1e-4), "{one:?} {other:?}");
 }
 
@@ -244,7 +244,7 @@ fn a_motor_reaches_its_speed_or_stalls_at_its_torque() {
     for _ in 0..60 {
         world.step().unwrap();
     }
-    // Half a radian per second, each second.
+    // 0.5 rad/s² for one second.
     let spin = f64::from(world.bodies.angular_velocity[wheel.index()]);
     assert!((spin - 0.5).abs() < 1e-4, "{spin}");
     assert!((world.joint_state(joint).unwrap().load[1] - 0.5 * inertia).abs() < 1e-3 * inertia);
@@ -253,7 +253,7 @@ fn a_motor_reaches_its_speed_or_stalls_at_its_torque() {
     }
     let spin = f64::from(world.bodies.angular_velocity[wheel.index()]);
     assert!((spin - 3.0).abs() < 1e-5, "{spin}");
-    // The angle goes on beyond a turn: 9 s² /(2·0.5) until the speed is reached, then 3 rad/s.
+    // The angle is not wrapped: 9/(2·0.5) rad until the target speed is reached, then 3 rad/s.
     let angle = world.joint_state(joint).unwrap().angle;
     assert!((angle - (9.0 + 3.0 * (460.0 / 60.0 - 6.0))).abs() < 0.1, "{angle}");
 }
@@ -324,7 +324,8 @@ fn a_world_with_joints_is_saved_and_goes_on_with_the_same_bits() {
     assert!(read.joint(joints[4]).is_err() && read.joint(joints[3]).is_ok());
 }
 
-/// A heavy chain, which `shim` solves at once, beside a loop of rods and a free pair, which sweeps solve; all are plain hinges.
+/// A heavy chain, which `shim` solves directly, next to a loop of rods and a free pair, which it solves by
+/// sweeps. All joints are plain hinges.
 fn chain_beside_loop(width: LaneWidth) -> (World, Vec<JointHandle>) {
     let mut world = World::new(Settings::new(find("shim").unwrap()).exactly(width));
     let ground = world.add_body(&BodyDef::fixed([0.0, 0.0])).unwrap();
@@ -339,7 +340,7 @@ fn chain_beside_loop(width: LaneWidth) -> (World, Vec<JointHandle>) {
     for (a, b, x) in [(0, 1, 1.0), (2, 3, 11.0)] {
         world.add_joint(&Joint::revolute(rods[a], rods[b]).anchor([x - 40.0, 0.0])).unwrap();
     }
-    // Two hinges of one body to the ground, and one between: a loop that cannot move.
+    // One hinge from each of two bodies to the ground, and one between them: a loop that cannot move.
     for (body, x) in [(0, 0.0), (1, 2.0)] {
         world.add_joint(&Joint::revolute(ground, rods[body]).anchor([x - 40.0, 0.0])).unwrap();
     }
@@ -359,7 +360,7 @@ fn a_heavy_chain_hangs_together_beside_what_sweeps_solve_with_the_same_bits_at_e
         (world.state_hash(), worst)
     };
     let (hash, worst) = run(LaneWidth::W1);
-    // The ball weighs 378 links.
+    // The ball weighs as much as 378 links.
     assert!(worst < 2e-4, "{worst} m");
     for width in LaneWidth::ALL {
         assert_eq!(run(width).0, hash, "{width:?}");
@@ -404,9 +405,11 @@ fn a_bridge_between_two_pins_bears_its_weight_and_a_load() {
     }
     joints.push(world.add_joint(&Joint::revolute(before, ground).anchor([30.0, 5.0])).unwrap());
     let load = ShapeDef::rectangle(1.0, 1.0).unwrap().with_density(10.0);
-    // It stands on the bridge from the start: a blow at v moves a plank by v h before joints know of it.
+    // The load starts on the bridge. A load that lands at speed v moves a plank by v h before the joints
+    // react.
     world.add_body(&BodyDef::dynamic([15.0, 6.1]).with(load)).unwrap();
-    // Of 30 planks of 2 kg and a load of 40 kg the ends bear all, by the slope of their tension.
+    // The two ends carry the whole weight, 30 planks of 2 kg and a load of 40 kg, through the slope of their
+    // tension.
     let (mut borne, mut gap) = (0.0, 0.0_f64);
     for step in 0..360 {
         world.step().unwrap();
@@ -424,7 +427,8 @@ fn a_bridge_between_two_pins_bears_its_weight_and_a_load() {
     assert!((borne - weight).abs() < 0.1 * weight, "{borne} of {weight} N");
 }
 
-/// Sweeps of motors and contacts move links after the chain is solved: solved once, joints come apart by centimeters.
+/// Motor and contact sweeps move links after the direct chain solve. With a single chain solve, joints
+/// separate by centimeters.
 #[test]
 fn a_bridge_with_friction_in_its_hinges_catches_boxes() {
     let (mut world, ground) = empty(find("shim").unwrap());
@@ -469,7 +473,7 @@ fn beam(world: &mut World, ground: BodyHandle, planks: usize, [length, height]: 
     }
 }
 
-/// Mechanical energy of these bodies, above the origin (J).
+/// Mechanical energy of these bodies, relative to the origin (J).
 fn energy(world: &World, bodies: std::ops::Range<usize>) -> f64 {
     let of = |i: usize| {
         let (v, w) = (world.bodies.velocity(i), world.bodies.angular_velocity[i]);
@@ -480,7 +484,8 @@ fn energy(world: &World, bodies: std::ops::Range<usize>) -> f64 {
     bodies.map(of).sum()
 }
 
-/// Most mechanical energy that comes in one of so many steps, as a share of what `loads`, which come last, have above the origin.
+/// Largest gain of mechanical energy in one of `steps` steps, as a fraction of the initial energy of the
+/// loads relative to the origin. The loads are the last `loads` bodies.
 fn most_energy_made(world: &mut World, loads: usize, steps: usize) -> f64 {
     let all = world.bodies.len();
     let had = energy(world, all - loads..all);
@@ -494,7 +499,8 @@ fn most_energy_made(world: &mut World, loads: usize, steps: usize) -> f64 {
     most / had
 }
 
-/// A box of 48 times the mass of a plank. With the masses of planks for contacts it gets half of its energy from nowhere.
+/// The box is 48 times as heavy as a plank. If contacts used the mass of single planks, it would gain half of
+/// its energy from nowhere.
 #[test]
 fn a_beam_bears_a_heavy_box_that_falls_on_it() {
     let (mut world, ground) = empty(find("shim").unwrap());
@@ -506,7 +512,7 @@ fn a_beam_bears_a_heavy_box_that_falls_on_it() {
     assert!(made < 1e-3, "{made} of the energy of the box");
 }
 
-/// Contacts of a beam have masses of their own, those of a pile 500 m away do not.
+/// Contacts of a beam use apparent masses. Contacts of a pile 500 m away must not.
 #[test]
 fn a_loaded_beam_far_away_changes_no_bit() {
     let run = |loaded: bool| {
@@ -528,7 +534,8 @@ fn a_loaded_beam_far_away_changes_no_bit() {
     assert_eq!(run(false), run(true));
 }
 
-/// Two planks of a frame overlap the wall that it is welded to, from both sides: one body, and no jam of two.
+/// Two planks of a frame overlap the wall that it is welded to, from both sides. Planks and wall count as one
+/// body, so the wall is not jammed between two bodies.
 #[test]
 fn a_frame_that_overlaps_its_own_wall_is_left_alone() {
     let (mut world, _) = empty(find("shim").unwrap());
@@ -545,7 +552,8 @@ fn a_frame_that_overlaps_its_own_wall_is_left_alone() {
     assert!(speed < 0.1, "{speed} m/s");
 }
 
-/// A light rod is driven between two planks. Were these two bodies to it, it would end up with thousands of rad/s.
+/// A light rod is driven between two planks. If the planks counted as two bodies, the rod would end up with
+/// thousands of rad/s.
 #[test]
 fn a_beam_is_one_body_to_what_is_caught_in_it() {
     let (mut world, ground) = empty(find("shim").unwrap());
@@ -559,7 +567,7 @@ fn a_beam_is_one_body_to_what_is_caught_in_it() {
     assert!(made < 0.1, "{made} of the energy of rod and ball");
 }
 
-/// Under a ball of 378 links. Without implicit tension two substeps leave 1.9 m.
+/// The ball weighs as much as 378 links. Without implicit tension, two substeps leave a gap of 1.9 m.
 #[test]
 fn a_heavy_chain_hangs_together_with_two_substeps() {
     let mut settings = Settings::new(find("shim").unwrap());
@@ -575,7 +583,7 @@ fn a_heavy_chain_hangs_together_with_two_substeps() {
     assert!(gap < 2e-3, "{gap} m");
 }
 
-/// With errors of the first order alone it loses 1 % of its energy.
+/// With first-order joint errors alone, the pendulum loses 1 % of its energy.
 #[test]
 fn a_pendulum_swings_for_a_minute_with_two_substeps() {
     let (mut world, ground) = empty(find("shim").unwrap());
@@ -594,13 +602,14 @@ fn a_pendulum_swings_for_a_minute_with_two_substeps() {
             last += energy(&world, 1..2) / 120.0;
         }
     }
-    // At rest it would be at −0.5 m.
+    // At rest the rod would be at −0.5 m.
     let share = (last - begun) / (begun + 5.0 * mass);
     assert!(share.abs() < 2e-3, "{share} of its energy");
     assert!(gap < 6e-4, "{gap} m");
 }
 
-/// A blow turns the plank until its weld is solved. With an error foreseen from that the plank leaves for meters.
+/// An impact turns the plank until its weld is solved. If the joint error were predicted from that rotation,
+/// the plank would fly off by meters.
 #[test]
 fn a_welded_plank_stays_where_it_is_hit() {
     let (mut world, ground) = empty(find("shim").unwrap());
@@ -620,7 +629,8 @@ fn a_welded_plank_stays_where_it_is_hit() {
     assert!(off < 0.01, "{off} m");
 }
 
-/// A train of discs at 100 m/s, 1.7 m a step, meets a thin wall: a first disc that stopped alone would be torn off.
+/// A train of discs at 100 m/s, 1.7 m per step, hits a thin wall. If the first disc stopped alone, it would
+/// be torn off.
 #[test]
 fn what_joints_hold_together_stops_together() {
     let (mut world, _) = empty(find("shim").unwrap());
@@ -645,8 +655,8 @@ fn what_joints_hold_together_stops_together() {
     assert!(stopped < -0.2 && world.bodies.velocity_x[train[0].index()] > 99.0, "{stopped} m");
 }
 
-/// A joint of the ground is none of the boxes that land on it: their impacts are solved before the step, as without the
-/// pendulum.
+/// A joint to the ground does not count as a joint of the boxes that land on it. Their impacts are solved
+/// before the step, as without the pendulum.
 #[test]
 fn a_pendulum_on_the_ground_does_not_matter_to_what_lands_there() {
     let visits = |with_pendulum: bool| {
@@ -672,7 +682,7 @@ fn a_pendulum_on_the_ground_does_not_matter_to_what_lands_there() {
     assert_eq!(visits(true), visits(false));
 }
 
-/// A type of joint from outside: a gear, b turns `ratio` times as far as a.
+/// A joint type defined outside the crate: a gear. Body b turns `ratio` times as far as a.
 #[derive(Clone, Debug)]
 struct Gear {
     ratio: f32,
@@ -721,7 +731,7 @@ fn a_type_of_joint_from_outside_takes_part_under_every_solver() {
             world.step().unwrap();
         }
         let [wa, wb] = [a, b].map(|body| world.bodies.angular_velocity[body.index()]);
-        // Multipliers of block descent act on after the blow with which the gears begin, and take speed away.
+        // In `avbd`, multipliers keep acting after the initial jolt of the gears and take speed away.
         let least = if solver.name == "avbd" { 0.2 } else { 0.5 };
         assert!((wb + 2.0 * wa).abs() < 0.05 && wa.abs() > least, "{}: {wa} and {wb} rad/s", solver.name);
     }

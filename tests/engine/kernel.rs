@@ -1,5 +1,5 @@
-//! The lane kernel against a plain scalar one in f64, written from the textbook: anchors and
-//! cross products instead of the contact frame, bodies read and written row by row.
+//! The lane kernel against a plain scalar kernel in f64, written from the textbook: it uses anchors and cross
+//! products instead of the contact frame, and reads and writes bodies row by row.
 
 use glam::{DVec2, Vec2};
 use proptest::prelude::*;
@@ -14,7 +14,7 @@ use simpulse::engine::lanes::{BodyRow, Lanes};
 
 const BODIES: usize = 24;
 const INV_H: f32 = 60.0;
-/// Bodies 0 and 1 are static; the others dynamic.
+/// Bodies 0 and 1 are static, the others dynamic.
 const STATIC: u32 = 2;
 
 type Full = Kernel<true, true, 2>;
@@ -63,7 +63,7 @@ fn setup() -> impl Strategy<Value = Setup> {
     )
 }
 
-/// Colors the contacts, dynamic ones first, as a world does.
+/// Colors the contacts as a world does, dynamic ones first.
 fn batches(setup: &Setup, width: usize) -> Batches {
     let mut batches = Batches::default();
     batches.clear(width);
@@ -92,7 +92,7 @@ fn batches(setup: &Setup, width: usize) -> Batches {
     batches
 }
 
-/// Three sweeps in lanes; the rows, and the impulses per contact and point.
+/// Three sweeps in lanes. Returns the rows, and the impulses per contact and point.
 fn in_lanes<L: Lanes>(setup: &Setup) -> (Vec<BodyRow>, Vec<[[f32; 2]; 2]>, Batches) {
     let mut rows = setup.rows.clone();
     let mut batches = batches(setup, L::WIDTH);
@@ -118,7 +118,7 @@ struct Body {
     inv_inertia: f64,
 }
 
-/// The textbook: J v, 1/(J M⁻¹ Jᵀ), apply, in the order of the lanes.
+/// The textbook sweep: J v, 1/(J M⁻¹ Jᵀ), apply, in the order of the lanes.
 fn by_the_book(setup: &Setup, order: &[u32]) -> (Vec<Body>, Vec<[[f64; 2]; 2]>) {
     let mut bodies: Vec<Body> = setup
         .rows
@@ -198,10 +198,9 @@ fn by_the_book(setup: &Setup, order: &[u32]) -> (Vec<Body>, Vec<[[f64; 2]; 2]>) 
 }
 
 proptest! {
-    /// Three sweeps of up to 60 contacts are some 10⁴ operations of size up to 10, each rounding
-    /// by 6e-8: 1e-3 is ten times their worst sum, and a hundredth of a typical impulse. A
-    /// clamp that rounding decides differently changes nothing beyond rounding, since the
-    /// clamped functions are continuous.
+    /// Three sweeps of up to 60 contacts are about 10⁴ operations on numbers of size up to 10, each rounding
+    /// by 6e-8. 1e-3 is ten times their worst-case sum and a hundredth of a typical impulse. If rounding
+    /// flips a clamp, the results change by rounding only, since the clamped functions are continuous.
     #[test]
     fn lanes_compute_what_the_textbook_says(setup in setup()) {
         let (rows, impulses, batches) = in_lanes::<wide::f32x8>(&setup);
@@ -236,7 +235,7 @@ proptest! {
         }
     }
 
-    /// Lanes without a contact, and the row they point at, stay zero whatever runs.
+    /// Lanes without a contact, and the row they point to, stay zero whatever runs.
     #[test]
     fn padding_is_inert(setup in setup()) {
         let (rows, _, batches) = in_lanes::<wide::f32x16>(&setup);
@@ -257,7 +256,7 @@ proptest! {
     }
 }
 
-/// A rule that pushes whatever it sees still leaves padding alone, because its effective mass is zero.
+/// A rule that pushes every lane still leaves padding alone, because its effective mass is zero.
 #[test]
 fn an_eager_rule_cannot_move_padding() {
     #[derive(Clone, Copy)]

@@ -1,4 +1,4 @@
-//! Laws of the engine, a file each.
+//! Laws of the engine, one file per law.
 
 mod coloring;
 mod convex;

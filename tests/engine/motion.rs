@@ -1,4 +1,4 @@
-//! Motion and rotation against exact discrete truths.
+//! Motion and rotation against exact discrete solutions.
 
 use glam::Vec2;
 use simpulse::engine::bodies::{BodyDef, BodyKind, ShapeDef};
@@ -59,7 +59,7 @@ fn free_fall_is_the_discrete_parabola() {
     }
 }
 
-/// Free spin (A16): θ = ω t when turned exactly, atan(ω h)/(ω h) of it when normalized.
+/// Free spin (A16): θ = ω t with exact rotation, and atan(ω h)/(ω h) times that with normalization.
 #[test]
 fn free_spin_turns_by_the_angle_of_its_update() {
     for update in [RotationUpdate::Exact, RotationUpdate::Normalized] {
@@ -80,7 +80,7 @@ fn free_spin_turns_by_the_angle_of_its_update() {
                 last = angle;
             }
             let truth = spin * 2.0 * ratio(spin * h);
-            // 120 products of unit numbers, each rounding by an ulp.
+            // 120 products of unit rotations, each rounding by an ulp.
             assert!(
                 (turned - truth).abs() < 1e-4 * truth.max(1.0),
                 "{update:?} {spin}: {turned} for {truth}"
@@ -183,7 +183,7 @@ fn the_speed_that_is_a_divergence_follows_the_length_unit() {
 fn a_rotation_that_is_no_number_is_a_divergence() {
     let mut world = world(Settings::new(find("pgs").unwrap()), &body(BodyKind::Dynamic, [0.0; 2]));
     world.step().unwrap();
-    // What a spin leaves that overflowed in a substep and was stopped in a later one.
+    // A spin that overflowed in one substep and was stopped in a later one leaves NaN.
     world.bodies.rotation_sin[0] = f32::NAN;
     assert_eq!(world.step().map_err(|divergence| divergence.body), Err(0));
 }

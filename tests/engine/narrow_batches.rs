@@ -1,5 +1,5 @@
-//! Law: the narrow phase in lanes finds what `collide_in_step` finds pair by pair, to the bit, at every
-//! width; and a contact keeps the impulses of the points whose features go on.
+//! Law: at every width, the narrow phase in lanes finds exactly what `collide_in_step` finds pair by pair, to
+//! the bit. A contact keeps the impulses of points whose features persist.
 
 use glam::Vec2;
 use proptest::prelude::*;
@@ -18,13 +18,13 @@ fn v(x: f32, y: f32) -> Vec2 {
     Vec2::new(x, y)
 }
 
-/// Pairs of one kind, body and shape 2i against 2i + 1, and what remembers their contacts.
+/// Pairs of one kind, body and shape 2i against 2i + 1, with their contacts.
 struct Scene {
     kind: PairKind,
     shapes: Vec<Shape>,
     numbers: Vec<u32>,
     rows: Shapes,
-    /// Per pair, its place in `contacts`.
+    /// Index into `contacts` for each pair.
     contact: Vec<u32>,
     contacts: Vec<Contact>,
 }
@@ -37,7 +37,7 @@ impl Scene {
         Scene { kind, shapes, numbers, rows, contact, contacts: Vec::new() }
     }
 
-    /// One step at `width`; returns the pairs that began or ended, in the order of the calls.
+    /// One step at `width`. Returns the pairs that began or ended, in the order of the calls.
     fn step(&mut self, width: LaneWidth, poses: &[Pose]) -> Vec<u32> {
         let poses: Vec<PoseRow> = poses.iter().map(PoseRow::new).collect();
         let names: Vec<u32> = (0..self.contact.len() as u32).collect();
@@ -79,7 +79,7 @@ impl Scene {
         }
     }
 
-    /// What the step should have found, with the impulses of `old` where features go on.
+    /// Expected result of the step, with the impulses of `old` where features persist.
     fn expected(&self, pair: usize, poses: &[Pose], old: &Manifold) -> Manifold {
         let (a, b) = (2 * pair, 2 * pair + 1);
         let (shapes, poses) = ([&self.shapes[a], &self.shapes[b]], [&poses[a], &poses[b]]);
@@ -93,7 +93,7 @@ impl Scene {
     }
 }
 
-/// The bits of all that is in use. An unused second point holds what the lanes left there.
+/// The bits of all fields in use. An unused second point holds whatever the lanes left there.
 fn bits(m: &Manifold) -> Vec<u32> {
     let mut bits = vec![m.count];
     if m.count > 0 {
@@ -146,7 +146,7 @@ fn hull() -> impl Strategy<Value = Shape> {
     ]
 }
 
-/// Segments, and the other straight shapes of which each kind may be one of the two.
+/// Any straight shape: a segment, rectangle, polygon or capsule.
 fn straight() -> impl Strategy<Value = Shape> {
     prop_oneof![
         1 => (point(1.5), point(1.5)).prop_filter_map("long enough", |(a, b)| Shape::segment("s", a, b).ok()),
@@ -155,7 +155,7 @@ fn straight() -> impl Strategy<Value = Shape> {
     ]
 }
 
-/// Shapes of some pairs of one kind: enough for a whole batch and a part of one, or less.
+/// Shapes for pairs of one kind: enough for a full batch and part of another, or fewer.
 fn pairs() -> impl Strategy<Value = (PairKind, Vec<Shape>)> {
     fn list(
         kind: PairKind,
@@ -173,7 +173,7 @@ fn pairs() -> impl Strategy<Value = (PairKind, Vec<Shape>)> {
         1 => list(PairKind::Hulls, hull(), straight()),
         1 => list(PairKind::HullCircle, straight(), circle()),
         1 => list(PairKind::CircleHull, circle(), straight()),
-        // All of one shape: the batch reads a single row.
+        // All pairs have the same shape: the batch reads a single row.
         1 => (hull(), 1usize..40).prop_map(|(shape, count)| (PairKind::Hulls, vec![shape; 2 * count])),
     ]
 }
@@ -188,8 +188,8 @@ fn poses() -> impl Strategy<Value = Vec<Pose>> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 600, rng_seed: RngSeed::Fixed(7), ..ProptestConfig::default() })]
 
-    /// Three steps: all pairs new; moved a little, so that most features go on; anywhere else, so
-    /// that contacts begin and end.
+    /// Three steps. In the first all pairs are new. In the second they move a little, so most features
+    /// persist. In the third they are anywhere else, so contacts begin and end.
     #[test]
     fn every_width_finds_what_single_pairs_find(
         (kind, shapes) in pairs(), start in poses(), other in poses(),
@@ -205,7 +205,7 @@ proptest! {
         for width in LaneWidth::ALL {
             let mut scene = Scene::new(kind, shapes.clone());
             for poses in [&start, &drifted, &other] {
-                // Impulses that tell pair and point.
+                // Impulses that identify pair and point.
                 let old: Vec<Manifold> = (0..scene.contact.len()).map(|pair| {
                     if let Some(contact) = scene.contacts.get_mut(scene.contact[pair] as usize) {
                         for (k, point) in contact.manifold.points.iter_mut().enumerate() {
@@ -237,8 +237,8 @@ proptest! {
         shape.for_each_vertex(|v| corners.push(v));
         let polygon = Shape::polygon("p", &corners, r).expect("valid");
         prop_assert_eq!(Shapes::default().push(&polygon).0, Class::Rectangle);
-        // Its normals come from corners rounded to 1e-7 m, along sides of 0.1 m and more: 2e-6 rad, over
-        // distances of up to 5 m. Flush faces (0.01 rad) may tie, and then either one is right.
+        // The polygon's normals come from corners rounded to 1e-7 m, along sides of 0.1 m and more: 2e-6 rad,
+        // over distances of up to 5 m. Flush faces (0.01 rad) may tie; then either face is correct.
         let (m, n) = (collide(&shape, &a[0], &other, &a[1], 10.0), collide(&polygon, &a[0], &other, &a[1], 10.0));
         let depth = |m: &Manifold| m.points().iter().map(|p| p.separation).fold(f32::INFINITY, f32::min);
         prop_assert!((depth(&m) - depth(&n)).abs() < 1e-5 + 5e-4);
@@ -254,7 +254,7 @@ fn alike_shapes_share_a_number_and_others_do_not() {
     let moved = shapes.push(&square(1.0));
     assert_ne!(first.1, moved.1);
     assert_eq!(shapes.push(&square(0.0)), first);
-    // Same numbers in another shape.
+    // The same numbers in another shape type.
     let ball = Shape::circle("c", Vec2::ZERO, 0.5).expect("valid");
     assert!(![first.1, moved.1].contains(&shapes.push(&ball).1));
 }

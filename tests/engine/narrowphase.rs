@@ -1,5 +1,5 @@
-//! Narrow phase: hand-computed cases, and laws over random shapes and poses with
-//! GJK and EPA (`f64`, by support functions) as the truth.
+//! Narrow phase: hand-computed cases, and laws over random shapes and poses with GJK and EPA (`f64`, by
+//! support functions) as reference.
 
 use glam::Vec2;
 use proptest::prelude::*;
@@ -11,14 +11,14 @@ use simpulse::engine::shapes::{Pose, Shape};
 /// Shapes are within a few meters of each other, so this keeps every point.
 const FAR: f32 = 1.0e6;
 
-/// Relative rounding of a separation: rotation, translation and dot product of a
-/// coordinate are some ten operations of 2⁻²⁴ each.
+/// Relative rounding of a separation: rotation, translation and dot product of a coordinate are about ten
+/// operations of 2⁻²⁴ each.
 const ROUNDING: f64 = 1.0e-6;
 
-/// Half a millimeter in favor of a's face between flush faces (`REFERENCE_TOLERANCE`).
+/// Preference for a's face between flush faces, half a millimeter (`REFERENCE_TOLERANCE`).
 const FLUSH_PREFERENCE: f64 = 5.0e-4;
 
-/// Vertices closer than this take the face's normal (`VERTEX_TOLERANCE`).
+/// Vertices closer than this use the face's normal (`VERTEX_TOLERANCE`).
 const VERTEX_TOLERANCE: f64 = 5.0e-5;
 
 fn v(x: f32, y: f32) -> Vec2 {
@@ -46,8 +46,8 @@ fn separation(manifold: &Manifold) -> f64 {
 
 #[test]
 fn box_on_box_has_two_points() {
-    // Unit boxes, the upper 0.01 m into the lower. Vertices: 0 lower left, 1 lower right,
-    // 2 upper right, 3 upper left. So the ends are a2–b1 on the right, a3–b0 on the left.
+    // Unit boxes, the upper one 0.01 m inside the lower. Vertices: 0 lower left, 1 lower right, 2 upper
+    // right, 3 upper left. So the end points are a2–b1 on the right and a3–b0 on the left.
     let unit = rectangle(0.5, 0.5);
     let m = collide(&unit, &at(3.0, 2.0), &unit, &at(3.0, 2.99), 0.02);
     assert_eq!((m.count, m.normal), (2, v(0.0, 1.0)));
@@ -62,7 +62,7 @@ fn box_on_box_has_two_points() {
 
 #[test]
 fn box_offset_by_half_is_cut() {
-    // Exactly flush: the right end is a's corner, the left end is b's.
+    // Exactly flush: the right end point is a's corner, the left one is b's.
     let unit = rectangle(0.5, 0.5);
     let m = collide(&unit, &at(0.0, 0.0), &unit, &at(0.5, 1.0), 0.02);
     assert_eq!((m.count, m.normal), (2, v(0.0, 1.0)));
@@ -70,7 +70,7 @@ fn box_offset_by_half_is_cut() {
     ends.sort_by(|p, q| p.x.total_cmp(&q.x));
     assert_eq!(ends, [v(0.0, 0.5), v(0.5, 0.5)]);
     assert_eq!([m.points[0].separation, m.points[1].separation], [0.0, 0.0]);
-    // Out of reach by less and more than the speculative distance.
+    // Gaps just below and just above the speculative distance.
     assert_eq!(collide(&unit, &at(0.0, 0.0), &unit, &at(0.5, 1.019), 0.02).count, 2);
     assert_eq!(collide(&unit, &at(0.0, 0.0), &unit, &at(0.5, 1.021), 0.02), Manifold::default());
 }
@@ -83,7 +83,7 @@ fn box_corner_on_ground() {
     let tilted = Pose::new(v(20.0, height), std::f32::consts::FRAC_PI_4);
     let m = collide(&ground, &at(0.0, 0.0), &unit, &tilted, 0.02);
     assert_eq!((m.count, m.normal), (1, v(0.0, 1.0)));
-    // The lower left vertex of b, 0, has become the lowest.
+    // Vertex 0 of b, its lower left, is now the lowest.
     assert_eq!(m.points[0].feature_id >> 8, 0);
     assert!((m.points[0].separation - 0.01).abs() < 1e-6);
     assert!((m.points[0].anchor_a - v(20.0, 1.005)).length() < 4e-6);
@@ -101,7 +101,8 @@ fn capsule_on_box() {
         assert!((point.anchor_a.y - 0.495).abs() < 1e-6 && point.anchor_a.x.abs() == 1.0);
     }
     assert_ne!(m.points[0].feature_id >> 8, m.points[1].feature_id >> 8);
-    // On its end, past the plate's corner: the normal is that of corner and capsule end.
+    // The capsule stands on its end, past the plate's corner. The normal runs from the corner to the
+    // capsule's end.
     let end = Pose { position: v(5.3, 0.5 + 1.0 + 0.4), rotation: v(0.0, 1.0) };
     let m = collide(&buffer, &at(0.0, 0.0), &capsule, &end, 1.0);
     assert_eq!(m.count, 1);
@@ -158,7 +159,7 @@ fn rounded_corners_meet_along_the_line_between_them() {
     assert!((m.normal - v(0.6, 0.8)).length() < 1e-6);
     assert!(m.points[0].separation.abs() < 1e-6);
     assert!((m.points[0].anchor_a - v(0.65, 0.7)).length() < 1e-6);
-    // Stacked with gaps of the radii between the cores and trembling: always two points.
+    // Stacked with gaps of the radii between the cores, with jitter: always two points.
     for jitter in [-1e-6, -1e-7, 0.0, 1e-7, 1e-6] {
         let upper = Pose::new(v(jitter, 1.5), jitter);
         assert_eq!(collide(&rounded, &at(0.0, 0.0), &rounded, &upper, 0.02).count, 2);
@@ -187,19 +188,20 @@ fn degenerate_positions_have_the_stated_normal() {
     let m = collide(&ball, &at(1.0, 1.0), &ball, &at(1.0, 1.0), 0.02);
     assert_eq!((m.normal, m.points[0].separation), (v(0.0, 1.0), -1.0));
 
-    // Centered in a 4 × 2 box: out of a long face; nearer to the right face: out of that.
+    // Centered in a 4 × 2 box, the ball leaves through a long face. Nearer to the right face, it leaves
+    // through that.
     let block = rectangle(2.0, 1.0);
     let m = collide(&block, &at(0.0, 0.0), &ball, &at(0.0, 0.0), 0.02);
     assert_eq!((m.normal.y.abs(), m.points[0].separation), (1.0, -1.5));
     let m = collide(&block, &at(0.0, 0.0), &ball, &at(1.75, 0.0), 0.02);
     assert_eq!((m.normal, m.points[0].separation), (v(1.0, 0.0), -0.75));
 
-    // On the axis of a segment: its left side.
+    // On the axis of a segment, it leaves to the left side.
     let segment = Shape::segment("s", v(0.0, 0.0), v(2.0, 0.0)).expect("valid");
     let m = collide(&segment, &at(0.0, 0.0), &ball, &at(1.0, 0.0), 0.02);
     assert_eq!((m.normal, m.points[0].separation), (v(0.0, 1.0), -0.5));
 
-    // Two boxes at one place: half a meter each way.
+    // Two boxes at the same place overlap by one meter: half a meter on each side.
     let unit = rectangle(0.5, 0.5);
     let m = collide(&unit, &at(0.0, 0.0), &unit, &at(0.0, 0.0), 0.02);
     assert_eq!((m.count, separation(&m), m.normal.length()), (2, -1.0, 1.0));
@@ -208,7 +210,7 @@ fn degenerate_positions_have_the_stated_normal() {
 // ---------------------------------------------------------------- random shapes
 
 fn coordinate(limit: f32) -> impl Strategy<Value = f32> {
-    // By integers: over many cases the sampler of symmetric float ranges fails its own assertion.
+    // Built from integers: over many cases, the sampler of symmetric float ranges fails its own assertion.
     (-(1i32 << 20)..=1 << 20).prop_map(move |k| limit * k as f32 / (1 << 20) as f32)
 }
 
@@ -257,7 +259,7 @@ fn both_segments(a: &Shape, b: &Shape) -> bool {
     matches!((a, b), (Shape::Segment { .. }, Shape::Segment { .. }))
 }
 
-/// Signed distance of two shapes: GJK apart, EPA overlapped.
+/// Signed distance of two shapes: GJK if they are apart, EPA if they overlap.
 fn truth(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> f64 {
     let radii = f64::from(a.radius()) + f64::from(b.radius());
     let apart = gjk::distance(a, pose_a, b, pose_b);
@@ -267,7 +269,7 @@ fn truth(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> f64 {
     core - radii
 }
 
-/// Outward normals of the faces of a core in world axes, both sides and both end axes of a segment.
+/// Outward face normals of a core in world axes. For a segment: both sides and both end directions.
 fn faces(shape: &Shape, pose: &Pose) -> Vec<Vec2> {
     let local = match shape {
         Shape::Circle { .. } => vec![],
@@ -280,9 +282,9 @@ fn faces(shape: &Shape, pose: &Pose) -> Vec<Vec2> {
     local.iter().map(|&n| pose.rotation.rotate(n)).collect()
 }
 
-/// How far the manifold may be from the truth: rounding; where two faces are flush (0.01
-/// rad), the preference for a's and 1e-4 of the core distance; and where cores just touch,
-/// the vertices that are too close to define a normal.
+/// How far the manifold may be from the reference. Rounding always counts. Flush faces (0.01 rad) add the
+/// preference for a's face and 1e-4 of the core distance. Cores that just touch add the distance of vertices
+/// too close to define a normal.
 fn tolerance(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> f64 {
     let scale = 4.0 + f64::from((pose_a.position - pose_b.position).length());
     let mut tolerance = ROUNDING * scale;
@@ -332,7 +334,7 @@ proptest! {
         for point in &m.points[..m.count as usize] {
             let between = point.anchor_a - point.anchor_b - (pb.position - pa.position);
             prop_assert!(between.length() <= 4.0 * f32::EPSILON * 8.0);
-            // With rounding, the other point of a slanted contact is only midway along the normal.
+            // With rounding, the other point of a slanted contact is midway only along the normal.
             if sharp || f64::from(point.separation) == separation(&m) {
                 let half = 0.5 * point.separation * m.normal;
                 let middle = pa.position + point.anchor_a;
@@ -348,7 +350,7 @@ proptest! {
         let tolerance = tolerance(&a, &pa, &b, &pb);
         prop_assert_eq!(m.count == 0, n.count == 0);
         prop_assert!((separation(&m) - separation(&n)).abs() <= 2.0 * tolerance || m.count == 0);
-        // Two faces may tie; then either normal is right. Else the points are the same.
+        // Two faces may tie; then either normal is correct. Otherwise the points are the same.
         if (m.normal - n.normal).length() < 1e-5 && tolerance < 1e-5 {
             prop_assert_eq!(m.count, n.count);
             for p in &m.points[..m.count as usize] {
@@ -378,8 +380,8 @@ proptest! {
 
     #[test]
     fn far_from_the_origin_equals_near(a in shape(), b in shape(), pa in pose(), pb in pose()) {
-        // On a grid of 2⁻⁷ m positions are exact to 2¹⁷ m, and so is their difference:
-        // nothing at all may change.
+        // On a grid of 2⁻⁷ m, positions are exact up to 2¹⁷ m, and so are their differences. Nothing may
+        // change.
         let snap = |p: Pose| Pose { position: (p.position * 128.0).round() / 128.0, ..p };
         let far = |p: Pose| Pose { position: p.position + v(1.0e5, -8.0e4), ..p };
         let (pa, pb) = (snap(pa), snap(pb));
@@ -402,7 +404,7 @@ proptest! {
         prop_assume!(!both_segments(&a, &b));
         let (ka, kb) = (10f32.powf(scale_a), 10f32.powf(scale_b));
         let (a, b) = (scaled(&a, ka), scaled(&b, kb));
-        // From overlap to apart, on the scale of the smaller.
+        // From overlapping to separated, on the scale of the smaller shape.
         let reach = 1.5 * ka + 1.5 * kb + gap * ka.min(kb);
         let pb = Pose::new(reach * Vec2::from_angle(direction), angle);
         let pa = at(0.0, 0.0);
@@ -417,7 +419,7 @@ proptest! {
 
     #[test]
     fn touching_exactly_is_finite(a in shape(), b in shape(), which in 0usize..64, angle in coordinate(3.0)) {
-        // A vertex of b on a vertex of a, and both bodies at one place.
+        // A vertex of b on a vertex of a, and both bodies at the same place.
         let core = |s: &Shape| { let mut c = vec![]; s.for_each_vertex(|p| c.push(p)); c };
         let (ca, cb) = (core(&a), core(&b));
         let rotation = Vec2::from_angle(angle);
@@ -448,7 +450,7 @@ proptest! {
             prop_assert_eq!(ids(&m), ids(&rest));
             prop_assert!((m.normal - rest.normal).length() < 4e-6);
         }
-        // Aligned boxes of equal size, and the lower one trembling.
+        // Aligned boxes of equal size, with jitter in the lower one.
         for k in -3..4 {
             let pose = Pose::new(v(0.0, height), k as f32 * 3e-7);
             let m = collide(&lower, &pose, &lower, &at(0.0, 2.0 * height), 0.02);
@@ -457,7 +459,7 @@ proptest! {
     }
 }
 
-/// The same shape, `k` times as large.
+/// The same shape, scaled by `k`.
 fn scaled(shape: &Shape, k: f32) -> Shape {
     match *shape {
         Shape::Circle { center, radius } => Shape::circle("c", k * center, k * radius),
@@ -471,7 +473,7 @@ fn scaled(shape: &Shape, k: f32) -> Shape {
     .expect("valid")
 }
 
-/// Two unit boxes side by side, 1 cm apart, that face each other along `overlap`.
+/// Two unit boxes side by side, 1 cm apart, whose facing sides overlap by `overlap`.
 #[test]
 fn faces_that_graze_each_other_are_no_contact_of_a_step() {
     let unit = Shape::rectangle("box", Vec2::splat(0.5), Vec2::ZERO, 0.0, 0.0).unwrap();
@@ -483,6 +485,6 @@ fn faces_that_graze_each_other_are_no_contact_of_a_step() {
     };
     assert_eq!(found(0.004, 0.01), [2, 0]);
     assert_eq!(found(0.006, 0.01), [2, 2]);
-    // What overlaps has to be pushed apart.
+    // Overlapping boxes must be pushed apart.
     assert_eq!(found(0.004, -0.001), [2, 2]);
 }

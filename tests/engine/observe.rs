@@ -1,4 +1,4 @@
-//! The law of a rule, read off from what it answers.
+//! The law of a rule, inferred from its responses.
 
 use simpulse::engine::constraints::kernels::observe::{NormalLaw, ObservedRule};
 use simpulse::engine::constraints::kernels::velocity::rules::{NormalRule, Rigid, Soft};
@@ -14,9 +14,9 @@ fn the_rigid_rule_closes_gaps_and_nothing_else() {
     assert_eq!(law(1.0 / 64.0), NormalLaw { bias: 1.0, compliance: 0.0 });
     assert_eq!(law(0.0), NormalLaw { bias: 0.0, compliance: 0.0 });
     assert_eq!(law(-0.1), NormalLaw { bias: 0.0, compliance: 0.0 });
-    // Roundings of a bias that is no power of two are not taken for softness.
+    // Rounding of a bias that is not a power of two is not mistaken for softness.
     assert_eq!(law(0.0123).compliance, 0.0);
-    // A bias beyond the first speeds tried.
+    // A bias beyond the first trial speeds.
     assert_eq!(law(16.0), NormalLaw { bias: 1024.0, compliance: 0.0 });
 }
 
@@ -31,7 +31,7 @@ fn the_soft_rule_is_an_implicit_spring() {
     // Three roundings of f32 at numbers below 4.
     assert!((law.bias + 0.01 * omega / denominator).abs() < 1e-6, "{law:?}");
     assert!((law.compliance - 0.5 / (h * omega * denominator)).abs() < 1e-6, "{law:?}");
-    // Twice the frequency against what does not move: β grows by 2·20.79/21.57 = 1.93, a by 2.08.
+    // Twice the frequency against static bodies: β grows by 2·20.79/21.57 = 1.93, a by 2.08.
     let against_static = rule.law(true, -0.01, 2.0).unwrap();
     assert!((against_static.bias / law.bias - 1.93).abs() < 0.01, "{against_static:?}");
     assert!((law.compliance / against_static.compliance - 2.08).abs() < 0.01, "{against_static:?}");

@@ -29,7 +29,7 @@ fn rows_are_complete() {
             assert!(v.set(&mut values, p.name, p.default).is_ok(), "{} {}", v.name, p.name);
             assert!(!p.meaning.is_empty() && p.name == p.name.to_lowercase(), "{} {}", v.name, p.name);
         }
-        // Iterations count something that the schedule has.
+        // Iterations count something the schedule contains.
         let (none, three) = (v.of_iterations(0), v.of_iterations(3));
         assert!(none != three && three.substeps == 1, "{}", v.name);
     }

@@ -1,4 +1,4 @@
-//! Shapes: what the constructors accept, and mass properties against closed forms and quadrature.
+//! Shapes: what constructors accept, and mass properties against closed forms and quadrature.
 
 use glam::{DVec2, Vec2};
 use simpulse::engine::shapes::{Aabb, MassProperties, Pose, Shape, combine};
@@ -16,7 +16,7 @@ fn close(a: f64, b: f64, tolerance: f64) {
     assert!((a - b).abs() <= tolerance * (1.0 + b.abs()), "{a} against {b}");
 }
 
-/// Closed forms in f64: only rounding, some tens of operations.
+/// Closed forms in f64: only rounding, a few tens of operations.
 const EXACT: f64 = 1e-14;
 
 #[test]
@@ -45,7 +45,7 @@ fn polygon_errors_name_the_vertex() {
     let star: Vec<Vec2> = (0..5).map(|i| Vec2::from_angle(i as f32 * 2.0 * 0.4 * PI as f32)).collect();
     assert!(polygon(&star).contains("cross itself"));
 
-    // Every turn is 1e-4 rad or more here, but eight of them enclose next to nothing.
+    // Each turn is 1e-4 rad or more here, but the eight vertices enclose almost no area.
     let arc: Vec<Vec2> = (0..8).map(|i| v(i as f32, -8e-6 * (i * (7 - i)) as f32)).collect();
     let error = polygon(&arc);
     assert!(error.contains("collinear") || error.contains("sliver"), "{error}");
@@ -93,7 +93,7 @@ fn mass_against_closed_forms() {
     close(block.center[0], 4.0, EXACT);
     close(block.inertia, 6.0 * (1.0 + 9.0) / 12.0, EXACT);
 
-    // Rectangle L × 2r and two half discs, each with its centroid 4r/3π beyond the axis end.
+    // Rectangle L × 2r and two half discs, each with its centroid 4r/3π beyond the end of the axis.
     let (l, r) = (2.0, 0.25);
     let capsule = Shape::capsule("c", v(-1., 0.), v(1., 0.), 0.25).expect("valid").mass(1.0);
     let (bar, disc) = (2.0 * l * r, PI * r * r);
@@ -105,7 +105,7 @@ fn mass_against_closed_forms() {
     assert_eq!(Shape::segment("s", v(0., 0.), v(1., 0.)).expect("valid").mass(1.0), MassProperties::ZERO);
 }
 
-/// Signed distance from a convex polygon (or segment) outline, by its edges alone.
+/// Signed distance from the outline of a convex polygon (or segment), from its edges alone.
 fn outline_distance(core: &[DVec2], p: DVec2) -> f64 {
     let n = core.len();
     let mut nearest = f64::INFINITY;
@@ -119,8 +119,8 @@ fn outline_distance(core: &[DVec2], p: DVec2) -> f64 {
     if inside { -nearest } else { nearest }
 }
 
-/// Area, centroid and inertia by the polar integrals ½∫ρ², ⅓∫ρ³(cos, sin), ¼∫ρ⁴ about an
-/// inner point, ρ(φ) by bisection of the outline distance.
+/// Area, centroid and inertia by the polar integrals ½∫ρ², ⅓∫ρ³(cos, sin), ¼∫ρ⁴ about an inner point, with
+/// ρ(φ) found by bisection of the outline distance.
 fn quadrature(core: &[DVec2], radius: f64, samples: u32) -> MassProperties {
     let pole = core.iter().sum::<DVec2>() / core.len() as f64;
     let step = TAU / f64::from(samples);
@@ -156,8 +156,8 @@ fn mass_against_quadrature() {
         shape.for_each_vertex(|p| core.push(p.as_dvec2()));
         let expected = quadrature(&core, f64::from(shape.radius()), 1 << 14);
         let mass = shape.mass(1.0);
-        // ρ has kinks, where the midpoint rule is off by h² times the jump of the slope:
-        // h = 3.8e-4, h²/24 = 6e-9 per kink, a slope jump of up to some 10, ten kinks.
+        // ρ has kinks, where the midpoint rule is off by h² times the jump of the slope: h = 3.8e-4,
+        // h²/24 = 6e-9 per kink, slope jumps of up to about 10, ten kinks.
         close(mass.mass, expected.mass, 5e-7);
         close(mass.center[0], expected.center[0], 5e-7);
         close(mass.center[1], expected.center[1], 5e-7);
@@ -167,7 +167,7 @@ fn mass_against_quadrature() {
 
 #[test]
 fn combine_is_the_parallel_axis_theorem() {
-    // A bar cut in two, and far from the origin.
+    // A bar cut in two, far from the origin.
     let half = |x| Shape::rectangle("b", v(0.5, 0.5), v(x, 64.0), 0.0, 0.0).expect("valid").mass(1.0);
     let whole = Shape::rectangle("b", v(1.0, 0.5), v(8.0, 64.0), 0.0, 0.0).expect("valid").mass(1.0);
     let both = combine(&[half(7.5), half(8.5)]);

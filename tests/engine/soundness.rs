@@ -1,6 +1,6 @@
-//! Law: safe functions are sound whatever they are given. Bad rows, bad contacts, wrong widths, short
-//! arrays and batches that were never filled end in a panic that says what is wrong, before or
-//! without a read or write out of place. Run it under valgrind as well (README, Benches).
+//! Law: safe functions are sound for any input. Bad rows, bad contacts, wrong widths, short arrays and
+//! batches that were never filled panic with a message that names the problem. No read or write is out of
+//! bounds. Run this under valgrind as well (README, Benches).
 
 use simpulse::engine::clock::{Clock, PhaseFilter};
 use simpulse::engine::constraints::ImpactLaw;
@@ -35,13 +35,13 @@ type Bare = Kernel<false, false, 1>;
 const RULE: Rigid = Rigid { inv_h: 60.0 };
 const POSITION: PositionSweep =
     PositionSweep { fraction: 0.2, slop: 0.005, max_correction: [0.2; 2], turned: true };
-/// As far out as an index can point, and just past the end of the rows below.
+/// The largest possible index, a large one, and one just past the end of the rows below.
 const FAR: [u32; 3] = [u32::MAX, 1_000_000_000, ROWS as u32];
-/// Rows of the good batches, the inert one among them, and contacts.
+/// Rows (including the inert one) and contacts of the good batches.
 const ROWS: usize = 24;
 const CONTACTS: usize = 20;
 
-/// What `run` panics with.
+/// Panic message of `run`.
 #[track_caller]
 fn panic_of<T>(run: impl FnOnce() -> T) -> String {
     let payload = catch_unwind(AssertUnwindSafe(|| drop(black_box(run())))).expect_err("no panic");
@@ -49,7 +49,7 @@ fn panic_of<T>(run: impl FnOnce() -> T) -> String {
     text.or(payload.downcast_ref::<&str>().copied()).unwrap_or("?").to_string()
 }
 
-/// Checks that `run` panics, and says `words`.
+/// Checks that `run` panics with a message that contains `words`.
 #[track_caller]
 fn panics<T>(words: &str, run: impl FnOnce() -> T) {
     let text = panic_of(run);
@@ -64,7 +64,7 @@ fn rows() -> Vec<BodyRow> {
     vec![BodyRow { velocity: [1.0; 4], delta: [0.5; 4] }; ROWS]
 }
 
-/// A segment against each kind of body, with `contact`, `a` and `b` in one lane of each.
+/// One segment per kind of opposite body, with `contact`, `a` and `b` in one lane of each.
 fn batches(width: usize, contact: u32, a: u32, b: u32) -> Batches {
     let mut batches = Batches::default();
     batches.clear(width);
@@ -80,7 +80,7 @@ fn good(width: usize) -> Batches {
     batches(width, 9, 9, 10)
 }
 
-/// Every pass over constraints, each on what it is given.
+/// Input of a pass over constraints.
 struct Given {
     rows: Vec<BodyRow>,
     batches: Batches,
@@ -105,7 +105,7 @@ impl Given {
         restitution::prepare::<L, Full>(rows, batches, bounces, contacts, &begin);
     }
 
-    /// With side records, as `restitution::prepare` makes them for good batches.
+    /// Adds side records, as `restitution::prepare` makes them for good batches.
     fn with_bounces<L: Lanes>(mut self) -> Self {
         let mut of = Given::new(good(L::WIDTH));
         of.prepare_bounces::<L>();
@@ -116,7 +116,7 @@ impl Given {
 
 type Pass = (&'static str, fn(&mut Given));
 
-/// Passes that read rows, and whether they also read contacts or side records.
+/// Passes that read rows, some of which also read contacts or side records.
 fn row_passes<L: Lanes>() -> [Pass; 7] {
     [
         ("sweep", |g| sweep::<L, Full, _>(&mut g.rows, &mut g.batches, RULE)),
@@ -133,7 +133,7 @@ fn row_passes<L: Lanes>() -> [Pass; 7] {
     ]
 }
 
-/// Passes that go by contacts.
+/// Passes that index contacts.
 fn contact_passes<L: Lanes>() -> [Pass; 3] {
     [
         ("prepare", |g| prepare::prepare::<L, Full>(&mut g.rows, &mut g.batches, &g.contacts)),
@@ -186,7 +186,7 @@ fn run_good<L: Lanes>() {
         pass(&mut given);
         assert!(given.rows[0].velocity[3] == 1.0, "{name}");
     }
-    // Batches that were never filled hold nothing to do.
+    // Batches that were never filled contain no work.
     for (_, pass) in all_passes::<L>() {
         pass(&mut Given { rows: vec![], contacts: vec![], ..Given::new(Batches::default()) });
     }
@@ -198,7 +198,7 @@ fn bad_rows<L: Lanes>() {
             let mut given = Given::new(batches(L::WIDTH, 9, 9, far)).with_bounces::<L>();
             let text = panic_of(|| pass(&mut given));
             assert!(text.contains(&far.to_string()), "{name}: {text}");
-            // Against a dynamic body, row a is read as well.
+            // Against a dynamic body, row a is read too.
             let mut given = Given::new(batches(L::WIDTH, 9, far, 10)).with_bounces::<L>();
             let text = panic_of(|| pass(&mut given));
             assert!(text.contains(&far.to_string()), "{name}: {text}");
@@ -247,7 +247,7 @@ fn wrong_layout<L: Lanes>() {
     panics(words, || prepare::store::<L, Bare>(&mut g.batches, &mut g.contacts));
     panics(words, || restitution::track::<L, Bare>(&mut g.batches, &mut g.bounces));
     panics(words, || g.batches.for_each_lane(&Features::NONE, |_, _, _, _| {}));
-    // A layout that no kernel has.
+    // A layout that no kernel uses.
     for stride in [0, 1, usize::MAX / 2, usize::MAX] {
         let mut batches = Batches::default();
         batches.clear(L::WIDTH);
@@ -282,7 +282,7 @@ fn no_bounces<L: Lanes>() {
     }
 }
 
-/// What lanes offer to kernels, by indices of which the last lane's points past the end by one, and by more.
+/// Gathers and scatters of lanes. The index of the last lane is past the end, by one or by more.
 fn bad_gathers<L: Lanes>() {
     for far in FAR {
         let mut list = [0; MOST_LANES];
@@ -301,7 +301,7 @@ fn bad_gathers<L: Lanes>() {
         let mut values = [0.0; ROWS];
         panics(&words, || L::load_at(&values, index));
         panics(&words, || L::store_at(&mut values, index, L::zero()));
-        // Records of three quads, of which the last one is not whole.
+        // Records of three quads, the last one incomplete.
         let mut quads = [Quad::default(); 3 * ROWS + 2];
         panics(&words, || L::gather_quads::<3, 0>(&quads, index));
         panics(&words, || L::scatter_quads::<3, 2>(&mut quads, index, [L::zero(); 4]));
@@ -314,7 +314,7 @@ fn bad_gathers<L: Lanes>() {
         panic_of(|| hull.gather_corners(&hulls, index, 8, |corner| corner));
         panic_of(|| hull.gather_corners(&hulls, index, 9, |corner| corner));
     }
-    // The last record itself is in place.
+    // The last record itself is in bounds.
     let list = [ROWS as u32 - 1; MOST_LANES];
     let index = LaneIndex::<L::Index>::new(&list);
     assert_eq!(index.only(), Some(ROWS - 1));
@@ -335,7 +335,7 @@ fn the_bound_of_a_list_is_never_below_an_entry() {
     assert_eq!((&list[..], list.list().bound()), (&[9; 5][..], 10));
     let part = IndexList::new(&[1, 2, 3, 50, 4, 5]).part(1..3);
     assert_eq!((part.entries(), part.bound()), (&[2, 3][..], 51));
-    // A batch that the list does not fill repeats its first entry.
+    // A batch that the list does not fill repeats the batch's first entry.
     let mut room = [0; MOST_LANES];
     let batch = IndexList::new(&[9, 8, 7]).batch_at::<[u32; 4]>(1, &mut room);
     assert_eq!((*batch.array(), batch.bound()), ([8, 7, 8, 8], 10));
@@ -355,7 +355,7 @@ fn batches_without_a_width_take_no_segment() {
     panics("without lanes", || Batches::default().clear(0));
 }
 
-/// The issue's own lines: rows far out, and no rows at all.
+/// Row indices far out of bounds, and no rows at all.
 #[test]
 fn a_sweep_over_no_rows_panics() {
     let mut batches = Batches::default();
@@ -396,7 +396,7 @@ fn a_step_says_what_is_wrong_before_it_begins() {
 
 const KINDS: [PairKind; 5] = PairKind::ALL;
 
-/// `pairs` pairs of one body and shape, with one list changed by `spoil`.
+/// Collides `pairs` pairs of the same body and shape, after `spoil` has changed one list.
 fn collide(kind: PairKind, width: LaneWidth, pairs: u32, contacts: usize, spoil: impl Fn(&mut Jobs)) {
     let mut shapes = Shapes::default();
     let shape = match kind {
@@ -476,12 +476,12 @@ fn prefetches_are_hints_at_any_address() {
 }
 
 mod words {
-    //! Where unsafe code may be.
+    //! Files that may contain unsafe code.
 
     use std::fs;
     use std::path::Path;
 
-    /// The whole list; each of these says why.
+    /// The complete list. Each file gives its reason.
     const LISTED: [&str; 4] = [
         "benches/peers/src/box2d.rs",
         "src/engine/lanes/quads.rs",
@@ -489,7 +489,7 @@ mod words {
         "tests/allocations.rs",
     ];
 
-    /// The code of a file: without line comments and what is between quotation marks.
+    /// The code of a file without line comments and string contents.
     fn code(text: &str) -> String {
         let mut code = String::new();
         for line in text.lines() {

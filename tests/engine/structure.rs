@@ -1,5 +1,5 @@
-//! What the tree promises to a reader: imports point downward, every solver has a row, every
-//! source an entry, every path named in `papers/README.md` a file.
+//! Structure of the source tree: imports point downward, every solver has a row, every source has an entry,
+//! and every path in `papers/README.md` exists.
 
 use simpulse::engine::solvers::VARIANTS;
 use std::collections::{BTreeMap, BTreeSet};
@@ -9,7 +9,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Every Rust file below a folder, with its text.
+/// Every Rust file below a folder, with its contents.
 fn files(folder: &Path) -> Vec<(PathBuf, String)> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display())) {
@@ -24,14 +24,14 @@ fn files(folder: &Path) -> Vec<(PathBuf, String)> {
     found
 }
 
-/// The code of a file: without comments and without its unit tests, which may look upward.
+/// The code of a file without comments and unit tests. Unit tests may import upward.
 fn code(text: &str) -> String {
     let text = text.split("#[cfg(test)]").next().unwrap_or(text);
     let lines = text.lines().map(|line| line.split("//").next().unwrap_or(line));
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// The words that follow `prefix` in `text`: the modules that it names.
+/// The words that follow `prefix` in `text`: the names of imported modules.
 fn named_after<'t>(text: &'t str, prefix: &str) -> BTreeSet<&'t str> {
     let word = |rest: &'t str| {
         let end = rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '_').unwrap_or(rest.len());
@@ -41,7 +41,7 @@ fn named_after<'t>(text: &'t str, prefix: &str) -> BTreeSet<&'t str> {
     for (at, _) in text.match_indices(prefix) {
         let rest = &text[at + prefix.len()..];
         match rest.strip_prefix('{') {
-            // A group at the top: each of its members begins after a brace or a comma at depth 1.
+            // A group at the top level: each member begins after a brace or a comma at depth 1.
             Some(group) => {
                 let mut depth = 0;
                 let mut begins = true;
@@ -67,7 +67,7 @@ fn named_after<'t>(text: &'t str, prefix: &str) -> BTreeSet<&'t str> {
     named
 }
 
-/// Rooms of a story from the ground up; those on one floor do not import each other.
+/// Modules of a layer, from the lowest floor up. Modules on one floor do not import each other.
 const ENGINE: &[&[&str]] = &[
     &["error", "params", "lanes"],
     &["clock", "shapes", "contacts", "coloring", "disjoint"],
@@ -141,7 +141,7 @@ fn no_two_files_of_a_room_import_each_other() {
         folders.entry(path.parent().unwrap().into()).or_default().insert(name, named);
     }
     for (folder, imports) in folders {
-        // Take away files that import nothing that is left, until nothing is left.
+        // Remove files that import none of the remaining files until none remain.
         let mut left: BTreeSet<&String> = imports.keys().collect();
         loop {
             let free: Vec<&String> = left
@@ -158,7 +158,8 @@ fn no_two_files_of_a_room_import_each_other() {
     }
 }
 
-/// The types that a line of code declares, private ones included; `type` inside a trait or an `impl` is no declaration.
+/// The type that a line of code declares, private ones included. `type` inside a trait or an `impl` does not
+/// count.
 fn declared(line: &str) -> Option<&str> {
     let rest = match line.trim_start().strip_prefix("pub") {
         Some(rest) if rest.starts_with('(') => rest.split_once(')')?.1.trim_start(),
@@ -171,10 +172,10 @@ fn declared(line: &str) -> Option<&str> {
     is_type.then(|| rest.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').next()).flatten()
 }
 
-/// One name, one thing: in the engine, the laboratory and the command line together.
+/// Each name denotes one thing across the engine, the laboratory and the command line.
 #[test]
 fn no_type_name_is_declared_twice() {
-    // Each layer has its errors; those of the laboratory hold those of the engine.
+    // Each layer has its own error type. The laboratory's wraps the engine's.
     const TWICE: [&str; 1] = ["Error"];
     let source = root().join("src");
     let mut places = BTreeMap::<String, Vec<String>>::new();
@@ -194,7 +195,7 @@ fn no_type_name_is_declared_twice() {
 #[test]
 fn every_solver_file_has_a_row_and_every_row_a_file() {
     let folder = root().join("src/engine/solvers");
-    // What is in a folder belongs to the solver of its name.
+    // Files in a folder belong to the solver of that name.
     let in_room = |path: &Path| path.strip_prefix(&folder).unwrap().iter().next().unwrap().to_owned();
     let names: BTreeSet<String> = files(&folder)
         .iter()
@@ -245,7 +246,7 @@ fn every_source_has_an_entry() {
             variant.source
         );
     }
-    // Cited anywhere in code or comments: a surname and a year in backticks.
+    // Keys cited anywhere in code or comments: a surname and a year in backticks.
     for (path, text) in files(&root().join("src")) {
         for word in text.split('`').skip(1).step_by(2) {
             let year = word.trim_start_matches(|c: char| c.is_ascii_lowercase());
@@ -274,8 +275,8 @@ fn every_path_in_the_list_of_sources_exists() {
     assert!(paths > 40, "{paths} paths found");
 }
 
-/// Times of steps that are compared with each other come from one function, whoever shows them: `run`, `study`, `advise`
-/// and `savings` cannot tell different times of one setting. All other clocks are of something else.
+/// Step times that are compared with each other come from one function. So `run`, `study`, `advise` and
+/// `savings` cannot report different times for one setting. All other clocks measure something else.
 #[test]
 fn steps_are_timed_in_one_place() {
     let source = root().join("src");
@@ -287,15 +288,15 @@ fn steps_are_timed_in_one_place() {
     let known = [
         // Times of steps.
         "lab/study/interleave.rs",
-        // Phases of a step, inside it.
+        // Phases inside a step.
         "engine/clock.rs",
-        // Steps and phases on a state that is held still, and what the machine can do.
+        // Steps and phases on a held state, and ceilings of the machine.
         "lab/profile/ceilings.rs",
         "lab/profile/growth.rs",
         "lab/profile/mod.rs",
         // Iterations of a frozen problem.
         "lab/converge/replay.rs",
-        // How long a command has taken.
+        // Run time of a command.
         "cli/times.rs",
         "lab/advise/search.rs",
     ];

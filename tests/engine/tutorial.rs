@@ -1,5 +1,5 @@
-//! A solver from outside, through the public API alone: a rule of its own, a parameter of its
-//! own, numbers kept per contact point, and as many sweeps as the residual asks for.
+//! A solver defined outside the crate through the public API alone: it has its own rule and parameter, keeps
+//! a number per contact point, and sweeps until the residual is small.
 
 use simpulse::engine::bodies::{BodyDef, BodyKind, ShapeDef};
 use simpulse::engine::clock::Phase;
@@ -13,7 +13,7 @@ use simpulse::engine::shapes::Shape;
 use simpulse::engine::solvers::Variant;
 use simpulse::engine::world::{Order, Settings, World};
 
-/// λ ← max(0, λ − m_eff (v_n + max(s, β s)/h)): closes gaps, and removes the share β of an overlap.
+/// λ ← max(0, λ − m_eff (v_n + max(s, β s)/h)): closes gaps and removes the fraction β of an overlap.
 #[derive(Clone, Copy)]
 struct Lift {
     inv_h: f32,
@@ -62,7 +62,7 @@ fn step(passes: &mut Passes<'_>) {
     }
     passes.integrate_positions();
     passes.end_substep(0);
-    // How many steps each point has been there.
+    // Age of each point in steps.
     passes.kept().points().iter_mut().for_each(|age| *age += 1.0);
 }
 
@@ -94,7 +94,7 @@ fn a_solver_from_outside_holds_a_stack_with_the_sweeps_that_it_needs() {
         let height = world.bodies.position_y[i + 1];
         assert!((height - (i as f32 + 0.5)).abs() < 0.01, "box {i} at {height}");
     }
-    // Cold contacts need many sweeps, warm ones few.
+    // Cold contacts need many sweeps, warm contacts few.
     assert!(sweeps[1] > 3 && *sweeps.last().unwrap() <= 2, "{sweeps:?}");
 }
 
@@ -136,7 +136,7 @@ fn what_it_keeps_follows_the_contact_points() {
 
 #[test]
 fn vectors_are_the_sweeps_problem() {
-    // J v by the system, then impulses applied by it: what a warm start does.
+    // J v through the system, then impulses applied through it, as in a warm start.
     static PROBE: Variant = Variant { name: "probe", make: || Schedule::boxed(probe), ..Variant::BASE };
     fn probe(passes: &mut Passes<'_>) {
         let h = passes.h();
@@ -149,7 +149,7 @@ fn vectors_are_the_sweeps_problem() {
         system.impulses(&mut impulses);
         assert!(!impulses.is_empty() && impulses.iter().any(|l| l[0] > 0.0));
         assert!(System::dot(&impulses, &after) >= System::dot(&impulses, &before), "impulses push apart");
-        // Taken back by hand, the velocities are those from before.
+        // After the impulses are undone by hand, the velocities are the earlier ones.
         let back: Vec<_> = impulses.iter().map(|l| [-l[0], -l[1]]).collect();
         system.apply(&back);
         let mut restored = Vec::new();
@@ -162,7 +162,7 @@ fn vectors_are_the_sweeps_problem() {
         passes.integrate_positions();
         passes.end_substep(0);
     }
-    /// The same vectors in lanes: products agree with those in contact order to rounding.
+    /// The same vectors in lanes: products agree with those in contact order up to rounding.
     fn in_lanes(passes: &mut Passes<'_>, impulses: &[[f32; 2]], velocities: &[[f32; 2]]) {
         let [mut lambda, mut u] = [(); 2].map(|()| passes.vector());
         let mut system = passes.system();
@@ -171,7 +171,7 @@ fn vectors_are_the_sweeps_problem() {
         let close = |a: f64, b: f64| assert!((a - b).abs() <= 1e-5 * a.abs().max(1e-3), "{a} for {b}");
         close(dot(&lambda, &lambda), System::dot(impulses, impulses));
         close(dot(&lambda, &u), System::dot(impulses, velocities));
-        // Taken back and given again in lanes, and seen in contact order.
+        // Undone and applied again in lanes, then read in contact order.
         update([&mut lambda], [], |[l], []| [scaled(-1.0, l)]);
         system.push_lanes(&mut lambda);
         system.apply(impulses);

@@ -1,5 +1,5 @@
-//! A constraint type from outside: two points that keep a distance. It joins the colors, batches
-//! and passes of every solver without a line in any of them.
+//! A constraint type defined outside the crate: two points at a fixed distance. It takes part in the colors,
+//! batches and passes of every solver with no change to any solver.
 
 use simpulse::engine::bodies::{BodyDef, BodyKind, ShapeDef};
 use simpulse::engine::clock::Phase;
@@ -12,19 +12,19 @@ use simpulse::engine::solvers::{Variant, find};
 use simpulse::engine::world::{Order, Settings, World};
 use std::sync::{Arc, Mutex};
 
-/// Records: unit vector from a to b (2), error of the distance (m), effective mass (kg), impulse (N·s).
+/// Records: unit vector from a to b (2), distance error (m), effective mass (kg), impulse (N·s).
 const STRIDE: usize = 5;
 
-/// Centers of mass of bodies a and b at a fixed distance: (v_b − v_a)·u + β C/h = 0.
+/// Keeps the centers of mass of bodies a and b at a fixed distance: (v_b − v_a)·u + β C/h = 0.
 #[derive(Debug)]
 struct Rods {
     ends: Vec<[u32; 2]>,
-    /// Of each rod: u, C and the impulse of the last substep.
+    /// Per rod: u, C and the impulse of the last substep.
     state: Vec<[f32; 4]>,
     seen: Arc<Mutex<Vec<(Phase, usize)>>>,
     /// Impulses at the end of the last step.
     impulses: Arc<Mutex<Vec<f32>>>,
-    /// Errors are removed by position sweeps, not by velocities.
+    /// Position sweeps remove errors, instead of velocities.
     nonlinear: bool,
 }
 
@@ -76,7 +76,7 @@ impl Rods {
                 let filled = segment.filled(batch, L::WIDTH);
                 let rods: &[u32] = rod.entries();
                 let (a, b) = (on.rows.gather::<L>(row_a), on.rows.gather::<L>(row_b));
-                // A mass may be infinite for a while, and padding has none.
+                // The inverse mass may be zero for a while, and is zero in padding.
                 let k = a[3] + b[3];
                 let mass = k.select_positive(L::splat(1.0) / k, L::zero());
                 if on.mode == PassMode::Masses {
@@ -109,7 +109,7 @@ impl Rods {
                 }
                 let [x, y, c, mass, old] = [0, 1, 2, 3, 4].map(|q| record[q]);
                 if on.phase == Phase::Position && self.nonlinear {
-                    // C at the poses that this sweep has reached.
+                    // C at the current poses of this sweep.
                     let now = c + x * (b[4] - a[4]) + y * (b[5] - a[5]);
                     let move_by = |row: [L; 8], d: L| {
                         [row[4] + row[3] * d * x, row[5] + row[3] * d * y, row[6], row[7]]
@@ -144,7 +144,7 @@ impl Rods {
 
 type Seen = Arc<Mutex<Vec<(Phase, usize)>>>;
 
-/// A chain of six discs at distance 1 on the ground, each pair held by a rod, and a box on top.
+/// A chain of six discs on the ground, 1 m apart, with a rod between neighbors and a box on top.
 fn chain(solver: &'static Variant, width: LaneWidth, order: Order) -> (World, Seen) {
     let mut world = World::new(Settings { order, ..Settings::new(solver).exactly(width) });
     let block = Shape::rectangle("box", glam::Vec2::new(20.0, 1.0), glam::Vec2::ZERO, 0.0, 0.0).unwrap();
@@ -191,7 +191,7 @@ fn types_have_the_same_bits_at_every_width_and_in_every_order() {
         let (mut world, _) = chain(find("soft_step").unwrap(), width, order);
         world.step().unwrap();
         if let Some(sweeps) = sweeps {
-            // Arranging and going back changes nothing.
+            // Rearranging the batches and back changes nothing.
             world.workspace().lanes.arrange(sweeps);
         }
         run(&mut world, 40);
@@ -205,13 +205,13 @@ fn types_have_the_same_bits_at_every_width_and_in_every_order() {
     assert_ne!(hash(LaneWidth::W1, Order::Natural, None), one, "another order");
 }
 
-/// Jacobi and mass splitting, with sweeps enough for a chain of six.
+/// Jacobi and mass splitting, with enough sweeps for a chain of six.
 fn summed(solver: &str, width: LaneWidth, order: Order) -> World {
     let solver = find(solver).unwrap();
     let (mut world, _) = chain(solver, width, order);
     (world.settings.budget.velocity_iterations, world.settings.budget.relax_iterations) = (60, 30);
     if let Ok(relaxation) = solver.parameter("relaxation") {
-        // Below 2/λ_max: a disc has three constraints.
+        // Below 2/λ_max: each disc has three constraints.
         world.settings.parameters[relaxation] = 0.5;
     }
     world
@@ -233,7 +233,7 @@ fn rods_take_part_in_sweeps_that_sum_up() {
     }
 }
 
-/// In one sweep that sums up, a rod sees nothing of what its neighbors do.
+/// In one summing sweep, a rod does not see what its neighbors do.
 #[test]
 fn one_jacobi_sweep_moves_the_neighbors_of_what_moves_and_no_others() {
     let speeds = |solver: &str| {
@@ -246,13 +246,14 @@ fn one_jacobi_sweep_moves_the_neighbors_of_what_moves_and_no_others() {
         [1, 2, 3, 4, 5, 6].map(|i| world.bodies.velocity_x[i])
     };
     let close = |found: [f32; 6], expected: [f32; 6]| {
-        // Some roundings at 3 m/s.
+        // A few roundings at 3 m/s.
         let off = found.iter().zip(expected).map(|(x, y)| (x - y).abs()).fold(0.0, f32::max);
         assert!(off < 1e-6, "{found:?}");
     };
-    // Rods 2–3 and 3–4, of equal masses, each take half of 3 m/s from disc 3 and give it to the other.
+    // Rods 2–3 and 3–4 join equal masses. Each takes half of 3 m/s from disc 3 and gives it to its other
+    // disc.
     close(speeds("jacobi"), [0.0, 1.5, 0.0, 1.5, 0.0, 0.0]);
-    // In turn: 2–3 halves 3 m/s, 3–4 halves the rest, and so on to the end of the chain.
+    // In turn: rod 2–3 halves 3 m/s, rod 3–4 halves the rest, and so on to the end of the chain.
     close(speeds("pgs"), [0.0, 1.5, 0.75, 0.375, 0.1875, 0.1875]);
 }
 
@@ -263,8 +264,9 @@ fn split_masses_count_rods_and_come_back() {
     world.settings.budget.relax_iterations = 0;
     world.settings.gravity = [0.0; 2];
     world.step().unwrap();
-    // Disc 6, at 3 m/s: one rod and the ground, two parts of a mass. Disc 5: two rods and the ground, three.
-    // The rod takes 3/(2 + 3) of m: 3 m/s less 3/5 for the one, and 3/5 for the other.
+    // Disc 6, at 3 m/s, has one rod and the ground: its mass is split in two. Disc 5 has two rods and the
+    // ground: three parts. The rod's impulse is 3/(2 + 3) of m: disc 6 slows down from 3 m/s by 3/5, and disc
+    // 5 reaches 3/5.
     let [x5, x6] = [5, 6].map(|i| world.bodies.velocity_x[i]);
     assert!((x5 - 0.6).abs() < 1e-6 && (x6 - 2.4).abs() < 1e-6, "{x5} {x6}");
 }
@@ -280,7 +282,7 @@ fn rods_are_in_the_passes_and_colors_of_the_contacts() {
     };
     let expected = [
         (Phase::Prepare, 5),
-        // Arms of constraints may have turned, so each substep starts warm by a pass.
+        // Arms of constraints may have turned, so each substep runs a warm-start pass.
         (Phase::WarmStart, 4 * 5),
         (Phase::Solve, 4 * 5),
         (Phase::Relax, 4 * 5),
@@ -310,7 +312,7 @@ fn a_held_world_brings_back_what_rods_keep() {
     assert_eq!(held.state_hash(), free.state_hash());
 }
 
-/// Two discs of mass m at distance 1 without gravity, the second at `speed`, and a rod with an error of `c`.
+/// Two discs of mass m, 1 m apart, without gravity: the second at `speed`, with a rod whose error is `c`.
 fn pair(solver: &str, width: LaneWidth, c: f32, speed: f64) -> (World, Arc<Mutex<Vec<f32>>>) {
     let mut world = World::new(Settings::new(find(solver).unwrap()).exactly(width));
     world.settings.gravity = [0.0; 2];
@@ -332,7 +334,8 @@ fn pair(solver: &str, width: LaneWidth, c: f32, speed: f64) -> (World, Arc<Mutex
     (world, impulses)
 }
 
-/// Equal masses: each moves by half of the error, which is linear in their places, so one sweep removes it.
+/// With equal masses, each disc moves by half of the error. The error is linear in their positions, so one
+/// sweep removes it.
 #[test]
 fn position_sweeps_move_bodies_of_other_types_and_leave_velocities() {
     for solver in ["pgs_ngs", "pgs_ngs_block", "tgs_ngs"] {
@@ -341,19 +344,20 @@ fn position_sweeps_move_bodies_of_other_types_and_leave_velocities() {
             world.step().unwrap();
             let b = &world.bodies;
             let off = (b.position_x[0] - 0.05).abs().max((b.position_x[1] - 0.95).abs());
-            // Some roundings at 1 m.
+            // A few roundings at 1 m.
             assert!(off < 1e-6, "{solver}, {width:?}: {:?}", b.position_x);
             assert_eq!((b.velocity_x[0], b.velocity_x[1]), (0.0, 0.0), "{solver}, {width:?}");
         }
     }
 }
 
-/// A rod stops its discs moving apart in the first step; the next has no sweep that would take its impulse back.
+/// In the first step a rod stops its discs from moving apart. The next step has no sweeps that could undo its
+/// impulse.
 #[test]
 fn solvers_that_forget_impulses_forget_those_of_other_types() {
     for (solver, forgets) in [("projection", true), ("tgs_sticky", true), ("pgs", false)] {
         let (mut world, impulses) = pair(solver, LaneWidth::W8, 0.0, 1.0);
-        // Where substeps start cold, a second one would have nothing to do.
+        // If substeps start cold, a second substep would have nothing to do.
         world.settings.budget.substeps = 1;
         world.step().unwrap();
         let first = impulses.lock().unwrap()[0];

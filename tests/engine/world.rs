@@ -1,4 +1,4 @@
-//! Laws of a world that its caller changes: handles, poses, forces, queries, events, copies.
+//! Laws of a world modified by its caller: handles, poses, forces, queries, events, copies.
 
 use simpulse::engine::bodies::{BodyDef, BodyHandle, ShapeDef};
 use simpulse::engine::broadphase::BroadPhaseKind;
@@ -8,7 +8,7 @@ use simpulse::engine::params::HIT_SPEED;
 use simpulse::engine::solvers::{self, VARIANTS};
 use simpulse::engine::world::{ContactEvent, Settings, World};
 
-/// What a user writes first.
+/// The first program of a user.
 #[test]
 fn the_first_program_runs() -> Result<(), Box<dyn std::error::Error>> {
     let settings = Settings { contact_events: true, ..Settings::new(solvers::find("shim")?) };
@@ -84,7 +84,7 @@ fn a_handle_is_of_one_body_only() {
         (world.add_body(&unit_box([0.0, 0.5])).unwrap(), world.add_body(&unit_box([5.0, 0.5])).unwrap());
     world.step().unwrap();
     world.remove_body(a).unwrap();
-    // Its place is free after the next step.
+    // Its slot is free after the next step.
     let c = world.add_body(&unit_box([10.0, 0.5])).unwrap();
     assert_ne!(c.index(), a.index());
     world.step().unwrap();
@@ -100,7 +100,7 @@ fn a_handle_is_of_one_body_only() {
     assert_eq!(world.handles().count(), 4);
 }
 
-/// What stood on a removed body falls, at once and like a stone.
+/// A body on top of a removed body falls at once, in free fall.
 #[test]
 fn what_stood_on_a_removed_body_falls() {
     for variant in VARIANTS {
@@ -117,8 +117,8 @@ fn what_stood_on_a_removed_body_falls() {
             world.step().unwrap();
         }
         let fallen = start - world.bodies.origin(high.index())[1];
-        // g t²/2 is 0.2 m; semi-implicit steps add a factor of 1 + 1/12. A solver may leave a step of gravity in the
-        // velocity of what rests (0.167 m/s · 0.2 s).
+        // g t²/2 is 0.2 m; semi-implicit steps add a factor of 1 + 1/12. A solver may leave one step of
+        // gravity in the velocity of a resting body (0.167 m/s · 0.2 s).
         assert!((0.195..0.217 + 0.034).contains(&fallen), "{}: {fallen} m", variant.name);
         assert!(world.contacts_of(low).is_err());
         assert!(
@@ -133,7 +133,7 @@ fn random(state: &mut u64) -> f64 {
     (*state >> 40) as f64 / (1 << 24) as f64
 }
 
-/// Steps a world that bodies come to, leave and are moved in.
+/// Steps a world in which bodies are added, removed and moved.
 fn edited(mut world: World, check: impl Fn(&mut World)) -> World {
     let mut state = 7;
     ground(&mut world);
@@ -180,7 +180,7 @@ fn no_solver_falls_over_edits() {
     }
 }
 
-/// Queries and copies leave no trace, and a copy is the same world.
+/// Queries and copies have no effect, and a copy behaves identically.
 #[test]
 fn queries_and_copies_change_no_bit() {
     for variant in VARIANTS {
@@ -208,11 +208,12 @@ fn a_force_lasts_for_a_step_and_a_standing_force_until_it_is_changed() {
     for _ in 0..3 {
         world.step().unwrap();
     }
-    // 30 m/s² for one step of 1/60 s, and for three.
+    // 30 m/s² for one step of 1/60 s, and for three steps.
     assert!((world.bodies.velocity_x[0] - 0.5).abs() < 1e-5, "{}", world.bodies.velocity_x[0]);
     assert!((world.bodies.velocity_x[1] - 1.5).abs() < 1e-5, "{}", world.bodies.velocity_x[1]);
     assert_eq!([world.bodies.force_x[0], world.bodies.torque[1]], [0.0, 0.0]);
-    // Frictionless discs in a scene where nothing spins have no rotation, until something spins.
+    // Frictionless discs have no rotation in a scene where nothing spins. Rotation is enabled as soon as
+    // something spins.
     let spin = world.bodies.inv_inertia[1] / 60.0;
     assert!((world.bodies.angular_velocity[1] / spin - 1.0).abs() < 1e-5);
 }
@@ -227,7 +228,7 @@ fn an_impulse_at_a_point_turns_a_body() {
     assert_eq!(world.bodies.angular_velocity[0], 0.5 * 100.0 * inv_inertia);
 }
 
-/// A static body that is moved takes its contacts with it.
+/// Contacts of a static body follow when it is moved.
 #[test]
 fn a_moved_ground_is_found_where_it_is() {
     let mut world = world("soft_step");
@@ -248,7 +249,7 @@ fn a_moved_ground_is_found_where_it_is() {
     );
 }
 
-/// Every shape, turned, moved off center and far from the origin, against rays and points.
+/// Every shape, turned, off center and far from the origin, against rays and points.
 #[test]
 fn rays_end_where_points_are_inside() {
     for (far, kind) in
@@ -278,7 +279,7 @@ fn rays_end_where_points_are_inside() {
             let inside = |d: f64| queries.bodies_at(at(d)).unwrap();
             let hit = queries.ray_cast(from, along).unwrap();
             let end = hit.map_or(40.0, |hit| hit.distance);
-            // Nothing before it …
+            // Nothing lies before the hit …
             for k in 0..200 {
                 let d = end * k as f64 / 200.0;
                 assert!(
@@ -286,7 +287,7 @@ fn rays_end_where_points_are_inside() {
                     "{from:?} {along:?} {d} of {end}"
                 );
             }
-            // … and the body behind it, unless it is only grazed.
+            // … and the body lies behind it, unless the ray only grazes it.
             let Some(hit) = hit else { continue };
             hits += 1;
             let slope = -(f64::from(hit.normal.x) * along[0] + f64::from(hit.normal.y) * along[1]);
@@ -321,7 +322,7 @@ fn a_box_query_is_exact() {
     assert!(queries.ray_cast([0.0; 2], [0.0; 2]).is_err());
 }
 
-/// The impulse of a hit is the change of momentum, and begins and ends are what the lists of contacts say.
+/// The impulse of a hit equals the change of momentum. Begin and end events match the contact lists.
 #[test]
 fn events_are_what_happened() {
     for variant in VARIANTS {
@@ -339,7 +340,7 @@ fn events_are_what_happened() {
             }
             world.step().unwrap();
             let change = world.contacts.len() as i32 - before as i32;
-            // With the weight of the step.
+            // Includes the weight over the step.
             let momentum = mass * (world.bodies.velocity_y[body.index()] + falling + 10.0 / 60.0);
             let mut counted = 0;
             for event in world.contact_events() {
@@ -356,7 +357,7 @@ fn events_are_what_happened() {
                         hits += 1;
                         assert!(approach_speed > HIT_SPEED && (normal.y - 1.0).abs() < 1e-3);
                         assert!((approach_speed - falling).abs() < 0.01 * falling, "{}", variant.name);
-                        // What these report are displacements over the substep, of which a part never was momentum.
+                        // These report displacements over the substep; part of each was never momentum.
                         if !["xpbd", "avbd"].contains(&variant.name) {
                             let error = (impulse / momentum - 1.0).abs();
                             assert!(error < 0.01, "{}: {impulse} N·s of {momentum}", variant.name);

@@ -1,9 +1,9 @@
-//! Mutations that know nothing of JSON but its letters.
+//! Mutations of raw text, which use only the characters of JSON and not its structure.
 
 use super::harness::Random;
 use rand::RngExt;
 
-/// Pieces that readers treat specially, or that name something.
+/// Fragments that readers treat specially, or names of fields and values.
 #[rustfmt::skip]
 const WORDS: &[&str] = &[
     "{", "}", "[", "]", ",", ":", "\"", "\\", "\\u0000", "\\ud800", "\\n", "\n", "\r\n", "\0", "\t",
@@ -18,7 +18,7 @@ const WORDS: &[&str] = &[
     "{\"a\":{\"a\":", "1e", ".5", "+1", "0x10", "um", "mm", " m", "e",
 ];
 
-/// A parent with one to five changes.
+/// A parent with one to five mutations.
 pub fn mutate(random: &mut Random, corpus: &[Vec<u8>]) -> Vec<u8> {
     let mut text = pick(random, corpus).clone();
     let changes = if random.random() { 1 } else { random.random_range(2..=5) };
@@ -53,7 +53,7 @@ fn change(random: &mut Random, text: &mut Vec<u8>, corpus: &[Vec<u8>]) {
         5 => drop(text.drain(slice)),
         6 => {
             let copy = text[slice.clone()].to_vec();
-            // Mostly once, at times so often that brackets nest or lists grow.
+            // Usually once, occasionally so often that brackets nest or lists grow.
             let times = if random.random_ratio(1, 20) { random.random_range(1..400) } else { 1 };
             text.splice(slice.end..slice.end, copy.repeat(times));
         }
@@ -64,14 +64,14 @@ fn change(random: &mut Random, text: &mut Vec<u8>, corpus: &[Vec<u8>]) {
         }
         8 if random.random_ratio(1, 4) => text.truncate(at),
         9 => {
-            // The head of one parent and the tail of another.
+            // The beginning of one parent and the end of another.
             let other = pick(random, corpus);
             let from = random.random_range(0..=other.len());
             text.truncate(at);
             text.extend(&other[from..]);
         }
         _ => {
-            // A number or word instead of a number.
+            // A fragment instead of a number.
             let is_digit = |b: &u8| b"0123456789.eE+-".contains(b);
             let Some(begin) = text[at..].iter().position(is_digit).map(|i| at + i) else { return };
             let end = text[begin..].iter().position(|b| !is_digit(b)).map_or(text.len(), |i| begin + i);

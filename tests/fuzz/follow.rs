@@ -1,4 +1,4 @@
-//! What an input is put through, and what may come of it.
+//! The checks that an input must pass, and its allowed outcomes.
 
 use super::bytes;
 use super::harness::Random;
@@ -21,18 +21,18 @@ use simpulse::lab::scenes::{self, Scene};
 use simpulse::lab::units;
 use std::path::Path;
 
-/// Scenes of more shapes are read, but not run: all of them may touch all others.
+/// Scenes with more shapes are read but not run: any shape may touch any other.
 const MOST_SHAPES: usize = 1500;
-/// Problems of more contacts and rows of joints are read, but not solved.
+/// Problems with more contacts and joint rows are read but not solved.
 const MOST_CONTACTS: usize = 12;
-/// Steps of more contacts and rows are not frozen: their files are large.
+/// Steps with more contacts and joint rows are not frozen, because their files are large.
 const MOST_FROZEN: usize = 300;
-/// Longest message (characters).
+/// Length limit of a message (characters).
 const LONGEST_MESSAGE: usize = 600;
 const STEPS: u64 = 3;
 
-/// A scene is refused in one line; or it comes back from its JSON as it was, runs, and all that is
-/// measured of it is finite.
+/// A scene is either rejected with a one-line message, or it survives a round trip through JSON, runs, and
+/// all its measured errors are finite.
 pub fn scene(input: &[u8], salt: u64) -> Result<String, String> {
     let text = String::from_utf8_lossy(input);
     let path = Path::new("fuzz.json");
@@ -45,7 +45,7 @@ pub fn scene(input: &[u8], salt: u64) -> Result<String, String> {
     }
     let json = scene.to_json();
     let back = Scene::from_json(&json, path).map_err(|e| format!("own JSON: refused, {e}"))?;
-    // Equality of floats takes −0 for 0; their text does not.
+    // Float equality treats −0 as 0, but the texts differ.
     if back != scene || back.to_json() != json {
         return Err("own JSON: another scene came back".to_string());
     }
@@ -73,7 +73,7 @@ pub fn scene(input: &[u8], salt: u64) -> Result<String, String> {
     ))
 }
 
-/// Everything that a run can choose.
+/// Random settings of a run, covering everything that a run can choose.
 fn settings(salt: u64) -> Settings {
     let mut random = Random::seed_from_u64(salt);
     let mut settings = Settings::new(bytes::one(&mut random, &VARIANTS));
@@ -91,7 +91,7 @@ fn settings(salt: u64) -> Settings {
     settings
 }
 
-/// Takes the steps, and freezes one of them; says how the run ended.
+/// Takes the steps and freezes one of them. Returns how the run ended.
 fn steps(world: &mut World, frozen_step: u64) -> Result<String, String> {
     let mut observation = Observation::new(world);
     for step in 0..STEPS {
@@ -126,7 +126,7 @@ fn steps(world: &mut World, frozen_step: u64) -> Result<String, String> {
     }
 }
 
-/// The problem of the coming step comes back from its file, or says why it cannot be one.
+/// The problem of the coming step survives a round trip through its file, or an error states why it cannot.
 fn freeze(world: &mut World) -> Result<(), String> {
     let frozen = Frozen { problem: capture(world, "fuzz"), reference: None };
     if frozen.problem.unknowns() > MOST_FROZEN {
@@ -144,8 +144,8 @@ fn same_frozen(frozen: &Frozen, text: &str) -> Result<(), String> {
     if same { Ok(()) } else { Err("own file: another problem came back".to_string()) }
 }
 
-/// A frozen problem is refused in one line; or it comes back as it was, and can be solved and
-/// measured or says why not.
+/// A frozen problem is either rejected with a one-line message, or it survives a round trip. It can then be
+/// solved and measured, or an error states why not.
 pub fn frozen(input: &[u8], salt: u64) -> Result<String, String> {
     let text = String::from_utf8_lossy(input);
     let frozen = match Frozen::from_text(&text, Path::new("fuzz.frozen")) {
@@ -196,14 +196,14 @@ pub fn frozen(input: &[u8], salt: u64) -> Result<String, String> {
     Ok(format!("accepted: {solution}, {curves}, {contacts} contacts, {rows} rows"))
 }
 
-/// Words of the command line: parameters, limits, scene names.
+/// Command-line words: parameters, limits, scene names.
 pub fn word(input: &[u8], salt: u64) -> Result<String, String> {
     let text = String::from_utf8_lossy(input);
     let unit = bytes::one(&mut Random::seed_from_u64(salt), &["m", "s", "N", "", "m/s"]);
     let number = units::quantity("max", &text, unit);
     let set = text.parse::<Override>().and_then(|given| overrides::check(&VARIANTS, &[given]));
     let size = text.split_once(':').and_then(|(_, size)| size.parse::<u32>().ok());
-    // Large scenes are slow to make.
+    // Large scenes take long to build.
     let scene = if size.is_some_and(|size| size > 100) { None } else { Some(scenes::load(&text)) };
     let mut shape = String::new();
     for result in [number.map(drop), set, scene.map_or(Ok(()), |s| s.map(drop))] {
@@ -215,7 +215,8 @@ pub fn word(input: &[u8], salt: u64) -> Result<String, String> {
     Ok(shape)
 }
 
-/// A message of one line that begins with its file and says something; its words without what is quoted.
+/// Checks that a message is a single, meaningful line that begins with its file. Returns its words without
+/// quoted parts.
 fn refused(error: &Error, start: &str) -> Result<String, String> {
     let message = error.to_string();
     one_line(&message)?;
@@ -223,7 +224,7 @@ fn refused(error: &Error, start: &str) -> Result<String, String> {
     if rest.len() < 8 {
         return Err(format!("message: says nothing, {message}"));
     }
-    // Only how deep its place is: names would make every message another one.
+    // Of the position, only the depth counts: names would make every message a new one.
     let (place, what) = rest.rsplit_once(": ").unwrap_or(("", rest));
     let mut words = format!("{} ", place.matches(['.', '[']).count().min(6));
     let mut quote = None;
@@ -249,17 +250,17 @@ fn one_line(message: &str) -> Result<(), String> {
     }
 }
 
-/// The second line of a frozen problem, or all of what has no second line.
+/// The second line of a frozen problem, or the whole text if there is only one line.
 pub fn payload(text: &[u8]) -> &[u8] {
     let start = text.iter().position(|&b| b == b'\n').map_or(0, |i| i + 1);
     text[start..].strip_suffix(b"\n").unwrap_or(&text[start..])
 }
 
-/// A file whose header fits the payload.
+/// A file with a header that matches the payload.
 pub fn signed(payload: &[u8]) -> Vec<u8> {
     let payload = String::from_utf8_lossy(payload);
     let payload = payload.strip_suffix('\n').unwrap_or(&payload);
-    // FNV-1a, written independently.
+    // FNV-1a, implemented independently.
     let mut hash = 14_695_981_039_346_656_037_u64;
     for byte in payload.bytes() {
         hash = (hash ^ u64::from(byte)).wrapping_mul(1_099_511_628_211);
@@ -271,7 +272,7 @@ pub fn signed(payload: &[u8]) -> Vec<u8> {
     .into_bytes()
 }
 
-/// A parent with another header.
+/// A parent with a mutated header.
 pub fn with_header(random: &mut Random, corpus: &[Vec<u8>]) -> Vec<u8> {
     let text = bytes::pick(random, corpus);
     let end = text.iter().position(|&b| b == b'\n').unwrap_or(text.len());

@@ -1,4 +1,4 @@
-//! The loop: mutate, judge, keep what is new, report what fails.
+//! The fuzzing loop: mutate, judge, keep new behavior, report failures.
 
 use rand::{RngExt, SeedableRng};
 use std::backtrace::Backtrace;
@@ -14,33 +14,33 @@ use std::time::{Duration, Instant};
 
 pub type Random = rand_pcg::Pcg64Mcg;
 
-/// Inputs longer than this are cut.
+/// Longer inputs are truncated.
 const MOST_BYTES: usize = 1 << 18;
-/// Inputs longer than this are tried, but have no children.
+/// Longer inputs are tried, but do not become parents.
 const MOST_BYTES_KEPT: usize = 12_000;
-/// Inputs that take longer are kept to be looked at.
+/// Inputs that take longer are saved for inspection.
 const SLOW: Duration = Duration::from_secs(10);
-/// One input may take this long in a long run.
+/// Time limit of one input in a long run.
 const LONGEST: Duration = Duration::from_secs(60);
-/// The process may hold this much in a long run (KiB).
+/// Memory limit of the process in a long run (KiB).
 const MOST_MEMORY_KIB: u64 = 3 << 20;
-/// Most inputs that are tried to make a failing one shorter.
+/// Largest number of trials when shortening a failing input.
 const MOST_CUTS: usize = 3000;
 
-/// What is fuzzed.
+/// A fuzz target.
 pub struct Target {
     pub name: &'static str,
-    /// First parents.
+    /// Initial parents.
     pub seeds: Vec<Vec<u8>>,
-    /// A child of one or two parents.
+    /// Makes a child of one or two parents.
     pub mutate: fn(&mut Random, &[Vec<u8>]) -> Vec<u8>,
-    /// How the input behaved, in words that are the same for alike inputs; or what is wrong. The
-    /// number chooses everything that the input leaves open.
+    /// Returns the behavior, in words that are equal for similar inputs, or the failure. The number selects
+    /// everything that the input leaves open.
     pub judge: fn(&[u8], u64) -> Result<String, String>,
 }
 
-/// Tries `inputs` inputs, or, if the environment says so, as many as the thread's time on a
-/// processor lasts for; panics with what was found.
+/// Tries `inputs` inputs. With `SIMPULSE_FUZZ_SECONDS`, tries as many as fit into that much processor time of
+/// the thread. Panics with the failures found.
 pub fn run(target: &Target, inputs: u64) {
     quiet_panics();
     if let Ok(path) = std::env::var("SIMPULSE_FUZZ_INPUT") {
@@ -60,7 +60,7 @@ pub fn run(target: &Target, inputs: u64) {
     let mut random = Random::seed_from_u64(seed);
     let watch = seconds.map(|_| HoldWatch::start(target.name));
 
-    // What is refused leads to other refusals, and seldom to a scene.
+    // Rejected inputs lead to other rejections and seldom to a scene, so they have their own list of parents.
     let (mut accepting, mut refusing) = (target.seeds.clone(), target.seeds.clone());
     let mut seen = HashSet::new();
     let mut accepted = 0;
@@ -130,7 +130,7 @@ pub fn run(target: &Target, inputs: u64) {
     assert!(reports.is_empty(), "{}", reports.join("\n"));
 }
 
-/// The judgment, with a panic as something wrong.
+/// Judges an input. A panic counts as a failure.
 fn judge(target: &Target, input: &[u8], salt: u64) -> Result<String, String> {
     QUIET.set(true);
     let verdict = catch_unwind(AssertUnwindSafe(|| (target.judge)(input, salt)));
@@ -138,12 +138,12 @@ fn judge(target: &Target, input: &[u8], salt: u64) -> Result<String, String> {
     verdict.unwrap_or_else(|_| Err(format!("panic: {}", LAST_PANIC.take())))
 }
 
-/// What is found once is reported once: panics by their place, others by their first words.
+/// Key that reports each failure once: panics by their location, others by their first words.
 fn kind(what: &str) -> String {
     what.split(": ").take(2).collect::<Vec<_>>().join(": ")
 }
 
-/// The input without all that it does not need to fail in the same way.
+/// Removes all parts of the input that are not needed for the same failure.
 fn shorten(target: &Target, mut input: Vec<u8>, salt: u64, what: &str) -> Vec<u8> {
     let mut tries = 0;
     let mut size = input.len() / 2;
@@ -172,7 +172,7 @@ thread_local! {
     static LAST_PANIC: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
-/// Panics of judged inputs are kept instead of printed.
+/// Stores panics of judged inputs instead of printing them.
 fn quiet_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -194,8 +194,8 @@ fn quiet_panics() {
     });
 }
 
-/// A second thread that ends the process if an input takes too long or too much memory. The input
-/// lies in a file before it is tried, so that an abort leaves it there, too.
+/// A second thread that ends the process if an input takes too much time or memory. The input is written to a
+/// file before it is tried, so it survives an abort.
 struct HoldWatch {
     path: PathBuf,
     file: Mutex<File>,
@@ -256,8 +256,8 @@ impl Drop for HoldWatch {
     }
 }
 
-/// Time that one thread has run, so that a busy machine does not look like a slow input; time that
-/// has passed, where the system does not say.
+/// Run time of one thread, so that a busy machine does not look like a slow input. Elapsed time if the system
+/// does not provide the run time.
 #[derive(Clone)]
 struct Clock {
     path: PathBuf,
@@ -277,7 +277,7 @@ impl Clock {
     }
 }
 
-/// Memory that the process holds; 0 where the system does not say.
+/// Memory held by the process; 0 if the system does not provide it.
 fn memory_kib() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));

@@ -1,15 +1,15 @@
-//! Mutations of JSON values, which leave the text well-formed where they are not meant to break it.
+//! Mutations of JSON values. They keep the text well-formed unless they are meant to break it.
 
 use super::bytes::{one, pick};
 use super::harness::Random;
 use rand::RngExt;
 use serde_json::{Map, Value, json};
 
-/// What [`Value`] cannot hold stands in a string with this at its start and is unpacked in the text.
+/// Prefix of a string for content that [`Value`] cannot hold. The text contains that content without quotes.
 const RAW: &str = "@raw ";
-/// A key that shall stand twice in an object.
+/// Prefix of a key that must appear twice in an object.
 const TWICE: &str = "@twice ";
-/// Most bodies of a scene after one mutation.
+/// Largest number of bodies of a scene after one mutation.
 const MOST_BODIES: usize = 1500;
 
 #[rustfmt::skip]
@@ -21,7 +21,7 @@ const NUMBERS: &[f64] = &[
     1.0000001, 65535.0, -1e9, -3.4e38,
 ];
 
-/// Tokens that are no numbers, or none that fit.
+/// Tokens that are not numbers, or are out of range.
 #[rustfmt::skip]
 const TOKENS: &[&str] = &[
     "1e999", "-1e999", "NaN", "Infinity", "-Infinity", "18446744073709551616", "-9223372036854775809",
@@ -80,7 +80,7 @@ pub fn all_joints() -> String {
     format!(r#"{{"name":"joints","bodies":[{bodies}],"joints":[{}]}}"#, JOINTS.join(","))
 }
 
-/// Adds a joint between two of the bodies that there are, or one more.
+/// Adds a joint between two of the existing bodies, or to a body just past the end.
 fn add_joint(random: &mut Random, scene: &mut Value) {
     let bodies = scene.get("bodies").and_then(Value::as_array).map_or(0, Vec::len) as u64;
     let Ok(mut joint) = serde_json::from_str::<Value>(one(random, JOINTS)) else { return };
@@ -97,7 +97,7 @@ fn add_joint(random: &mut Random, scene: &mut Value) {
     }
 }
 
-/// A scene with one to six changes, most of them to values that scenes may have.
+/// A scene with one to six mutations, most of them to valid values.
 pub fn mutate_scene(random: &mut Random, corpus: &[Vec<u8>]) -> Vec<u8> {
     let Some(mut scene) = parse(random, corpus) else { return super::bytes::mutate(random, corpus) };
     for _ in 0..random.random_range(1..=6) {
@@ -112,8 +112,8 @@ pub fn mutate_scene(random: &mut Random, corpus: &[Vec<u8>]) -> Vec<u8> {
     text(&scene)
 }
 
-/// The payload of a frozen problem with one to four changes, mostly without its reference, which
-/// would not hold any more.
+/// The payload of a frozen problem with one to four mutations. Its reference, which would no longer hold, is
+/// usually removed.
 pub fn mutate_frozen(random: &mut Random, corpus: &[Vec<u8>]) -> Vec<u8> {
     let payload = super::follow::payload(pick::<Vec<u8>>(random, corpus));
     let Ok(mut frozen) = serde_json::from_slice::<Value>(payload) else {
@@ -128,7 +128,7 @@ pub fn mutate_frozen(random: &mut Random, corpus: &[Vec<u8>]) -> Vec<u8> {
     text(&frozen)
 }
 
-/// A value with one or two changes, as text.
+/// A value with one or two mutations, as text.
 pub fn mutate_line(random: &mut Random, line: &[u8]) -> Vec<u8> {
     let Ok(mut value) = serde_json::from_slice::<Value>(line) else { return line.to_vec() };
     for _ in 0..random.random_range(1..=2) {
@@ -153,7 +153,7 @@ fn text(value: &Value) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// One change anywhere in the value.
+/// Mutates a random place in the value.
 fn change(random: &mut Random, root: &mut Value) {
     let target = random.random_range(0..count(root));
     let mut left = target;
@@ -177,7 +177,7 @@ fn count(value: &Value) -> usize {
     }
 }
 
-/// The node after `left` others.
+/// The node after `left` other nodes.
 fn nth<'a>(value: &'a mut Value, left: &mut usize) -> Option<&'a mut Value> {
     if *left == 0 {
         return Some(value);
@@ -245,7 +245,7 @@ fn name(random: &mut Random) -> String {
     }
 }
 
-/// A value of any type.
+/// A random value of any type.
 fn other(random: &mut Random) -> Value {
     match random.random_range(0..9) {
         0 => Value::Null,
@@ -267,7 +267,7 @@ fn other(random: &mut Random) -> Value {
     }
 }
 
-/// A change that scenes survive: other shapes, masses, places, many bodies.
+/// A mutation that leaves a scene valid: other shapes, masses, positions, many bodies.
 fn change_bodies(random: &mut Random, scene: &mut Value, corpus: &[Vec<u8>]) {
     if random.random_ratio(1, 8) {
         let (key, value) = match random.random_range(0..4) {
@@ -286,13 +286,13 @@ fn change_bodies(random: &mut Random, scene: &mut Value, corpus: &[Vec<u8>]) {
     }
     let [i, j] = [0; 2].map(|_| random.random_range(0..bodies.len()));
     match random.random_range(0..12) {
-        // The same body at the same place.
+        // A second copy of a body in the same place.
         0 => bodies.push(bodies[i].clone()),
         1 => {
             let place = bodies[i].get("position").cloned().unwrap_or_default();
             set(&mut bodies[j], "position", place);
         }
-        // Many of one body, in one place or in a row.
+        // Many copies of one body, in one place or in a row.
         2 if random.random_ratio(1, 6) => {
             let most = if random.random_ratio(1, 10) { MOST_BODIES } else { 60 };
             let stride = one(random, &[0.0, 1e-3, 0.5, 1.0, 3.0, 1e6]);

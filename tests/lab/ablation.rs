@@ -1,4 +1,4 @@
-//! Every mechanism of a solver is needed: what its row says fails without it.
+//! Every mechanism of a solver is needed: the case named in its row fails without it.
 
 use simpulse::engine::params::Without;
 use simpulse::engine::solvers::VARIANTS;
@@ -6,13 +6,13 @@ use simpulse::engine::world::Settings;
 use simpulse::lab::torture::{TortureVerdict, family, run_solver};
 use simpulse::lab::verify::{self, Lab};
 
-/// Scenes of a family that are drawn.
+/// Scenes drawn per family.
 const SCENES: u32 = 120;
 
-/// A family's scenes count for a mechanism if at least so many more fail without it (1).
+/// Smallest ratio of failing scenes without a mechanism to failing scenes with it (1).
 const MORE: f64 = 1.3;
 
-/// And by so many at least.
+/// Smallest difference of these numbers.
 const AT_LEAST: f64 = 3.0;
 
 #[test]

@@ -1,4 +1,4 @@
-//! `simpulse advise`: what it recommends holds, and what it cannot do it says.
+//! `simpulse advise`: its recommendation holds, and it reports what it cannot do.
 
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::find;
@@ -47,11 +47,11 @@ fn what_is_recommended_keeps_the_limits_when_it_is_run_again() {
     assert_eq!(Some(errors), best.errors);
     assert!(errors.penetration(false) <= 2e-3 && again.truth.unwrap().error.unwrap() <= 0.05);
 
-    // Of the finalists that meet the limits it is the fastest, and they are in order.
+    // The recommendation is the fastest finalist that meets the limits, and the finalists are sorted by time.
     let times: Vec<f64> =
         advice.finalists.iter().filter(|t| t.is_good()).map(|t| t.time.unwrap().median_ns).collect();
     assert!(times.is_sorted(), "{times:?}");
-    // Both solvers can do it, so both are timed.
+    // Both solvers meet the limits, so both are timed.
     let solvers = |t: &Trial| t.setting.solver.name;
     for name in ["pgs", "soft_step"] {
         assert!(advice.finalists.iter().any(|t| solvers(t) == name), "{name}");
@@ -60,16 +60,16 @@ fn what_is_recommended_keeps_the_limits_when_it_is_run_again() {
 
 #[test]
 fn a_limit_out_of_reach_has_a_nearest_setting_and_no_advice() {
-    // f32 holds the height of these bodies to 2e-7 m, and settling takes more than that.
+    // f32 resolves the height of these bodies to 2e-7 m, and settling takes more than that.
     let limits = Limits { penetration: Some(1e-9), ..Limits::default() };
     let advice = advise(&plan("stack:3", limits), &|_| ()).unwrap();
     assert!(advice.best().is_none() && advice.runner_up().is_none());
     let nearest = advice.nearest().unwrap();
     assert!(nearest.excess > 1.0 && nearest.excess.is_finite());
     assert!(advice.trials.iter().all(|t| t.excess >= nearest.excess));
-    // Nothing was good, and nothing too slow: the whole grid was tried.
+    // No setting was good and none was too slow, so the whole grid was tried.
     assert_eq!(advice.left_out, 0);
-    // No step takes a nanosecond, and more work takes no less: little is tried.
+    // No step is as fast as a nanosecond, and more work is no faster, so few settings are tried.
     let limits = Limits { time_ns: Some(1.0), penetration: Some(1.0), ..Limits::default() };
     let hopeless = advise(&plan("stack:3", limits), &|_| ()).unwrap();
     assert!(hopeless.best().is_none() && hopeless.trials.len() < advice.trials.len() / 4);

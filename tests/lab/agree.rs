@@ -1,4 +1,4 @@
-//! Law: every solver is its source's method, written once more in `f64`, up to departures that its docs name.
+//! Law: every solver matches its source's method, reimplemented in `f64`, up to departures named in its docs.
 
 use simpulse::engine::solvers::VARIANTS;
 use simpulse::lab::agree::table::TABLE;
@@ -19,7 +19,7 @@ fn every_solver_has_an_entry() {
     }
 }
 
-/// Distances are within their bounds, and docs say what the table and the measurement say.
+/// Distances are within their bounds, and the docs match the table and the measurement.
 #[test]
 fn solvers_agree_with_their_sources() {
     let (mut wrong, mut all) = (String::new(), Vec::new());
@@ -46,7 +46,7 @@ fn docs(line: &str) -> Option<String> {
     line.strip_prefix("//!").map(String::from)
 }
 
-/// A method that differs is found: one substep more, or a departure that is taken back.
+/// A difference in method is detected: one extra substep, or a departure undone.
 #[test]
 fn a_departure_shows() {
     let pgs = agree::agreement(simpulse::engine::solvers::find("pgs").unwrap()).unwrap();

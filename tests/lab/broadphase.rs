@@ -1,4 +1,4 @@
-//! Every kind of broad phase gives the pairs of the definition.
+//! Every kind of broad phase finds the pairs of the definition.
 
 use glam::Vec2;
 use proptest::prelude::*;
@@ -19,9 +19,9 @@ fn pairs_of(kind: BroadPhaseKind, proxies: &[Proxy]) -> Vec<[u32; 2]> {
     out
 }
 
-/// The definition once more, in other words than the crate's.
+/// The definition again, written independently of the crate's.
 fn expected(proxies: &[Proxy]) -> Vec<[u32; 2]> {
-    // Intervals that share a point; none do with a NaN bound.
+    // Intervals that share a point. With a NaN bound, none do.
     let meet = |a: [f32; 2], b: [f32; 2]| a[0] <= b[1] && b[0] <= a[1];
     let x = |p: &Proxy| [p.aabb.min.x, p.aabb.max.x];
     let y = |p: &Proxy| [p.aabb.min.y, p.aabb.max.y];
@@ -83,7 +83,8 @@ fn boxes_at_one_place() {
     assert_eq!(check(&points).len(), 60 * 59 / 2);
 }
 
-/// 21 boxes per row, each within a margin of its neighbors, on a ground of half extents (100, 1).
+/// A pyramid with a base of 21 boxes, each within a margin of its neighbors, on a ground of half extents
+/// (100, 1).
 #[test]
 fn pyramid_on_a_ground() {
     let margin = 0.02;
@@ -96,7 +97,8 @@ fn pyramid_on_a_ground() {
             proxies.push(boxed([x - margin, row as f32 - margin], [size, size], proxies.len() as u32));
         }
     }
-    // Ground 21; per row of k boxes k − 1 neighbors and 2(k − 1) supports of the row above.
+    // The ground has 21 pairs. A row of k boxes has k − 1 neighbor pairs, and 2(k − 1) pairs with the row
+    // above.
     assert_eq!(check(&proxies).len(), 21 + (1..=21).map(|k| 3 * (k - 1)).sum::<usize>());
 }
 
@@ -109,7 +111,7 @@ fn the_ends_of_the_float_range() {
         boxed([1e-40, 0.0], [1e-40, 1e-40], 3),
         boxed([-1e-40, -1e-42], [1e-40, 1e-42], 4),
     ];
-    // Bounds whose extent is no float.
+    // Bounds whose extent is not representable as a float.
     proxies[0].aabb.max = Vec2::splat(3e38);
     proxies[2].aabb.max.x = f32::INFINITY;
     for (body, &x) in [1e5f32, 1e6, 1e6, 1e30, -1e30, 1e38, 1e6 + 0.0625].iter().enumerate() {
@@ -122,13 +124,13 @@ fn the_ends_of_the_float_range() {
         let max = Vec2::new(if body % 3 == 0 { f32::INFINITY } else { 3e38 }, y + 1.0);
         proxies.push(Proxy { aabb: Aabb { min, max }, body, group: 0, dynamic: true });
     }
-    // One with no place at all but "beyond".
+    // A box at infinity, which no cell but "beyond" can hold.
     let beyond = Vec2::new(f32::INFINITY, 0.0);
     proxies.push(Proxy { aabb: Aabb { min: beyond, max: beyond }, body: 99, group: 0, dynamic: true });
     check(&proxies);
 }
 
-/// The pairs of the others stay as they are.
+/// The pairs of the other proxies stay the same.
 #[test]
 fn nan_meets_nothing() {
     for hole in 0..4 {
@@ -139,7 +141,7 @@ fn nan_meets_nothing() {
     }
 }
 
-/// Coordinates that are a whole number of hash blocks apart still spread.
+/// Coordinates a whole number of hash blocks apart must still spread.
 #[test]
 fn regular_spacing() {
     for spacing in [16.0, 64.0, 1024.0, 65536.0] {
@@ -155,8 +157,8 @@ fn regular_spacing() {
     }
 }
 
-/// The bound that `HashGrid::bytes` states, for scenes that would fill a
-/// grid of one cell size with billions of cells.
+/// The bound stated by `HashGrid::bytes`, for scenes that would fill a grid of one cell size with billions of
+/// cells.
 #[test]
 fn memory_is_linear() {
     for n in [1usize, 10, 1000, 5000] {
@@ -167,7 +169,7 @@ fn memory_is_linear() {
                 let place = [(i * 7919 % n) as f32, (i * 104_729 % n) as f32];
                 proxies.push(boxed(place, [size, size], i as u32));
             }
-            // Pairs are not part of the bound; without a dynamic body there are none.
+            // Pairs are not part of the bound. Without a dynamic body there are none.
             proxies.iter_mut().for_each(|p| p.dynamic = false);
             let mut grid = HashGrid::new();
             let mut out = Vec::new();
@@ -180,7 +182,7 @@ fn memory_is_linear() {
     }
 }
 
-/// How sizes and places are drawn.
+/// Distribution of sizes and positions.
 #[derive(Clone, Copy, Debug)]
 enum Style {
     Even,
@@ -236,7 +238,7 @@ proptest! {
         }
     }
 
-    /// One broad phase through unrelated scenes: nothing is left of the last one.
+    /// One broad phase on unrelated scenes in turn: no state of the last scene remains.
     #[test]
     fn history_does_not_show(scenes in proptest::collection::vec(scene(), 1..5)) {
         for kind in BroadPhaseKind::ALL {
@@ -274,7 +276,8 @@ proptest! {
         }
     }
 
-    /// The same told which proxies changed: from one alone up to more than are worth merging.
+    /// The same through `update`, with a list of the changed proxies: from a single proxy to more than are
+    /// worth merging.
     #[test]
     fn updates(
         mut proxies in scene(),
@@ -310,7 +313,7 @@ proptest! {
         }
     }
 
-    /// Fat boxes hold the grown bounds whatever bodies do, and change only where it is told.
+    /// Fat boxes contain the grown bounds however bodies move, and change only where `update` reports it.
     #[test]
     fn fat_boxes_keep_their_promise(
         far in prop::sample::select(vec![0.0f32, 1e3, 1e6]),
@@ -360,7 +363,7 @@ proptest! {
     }
 }
 
-/// What bounds may be off by: four units in the last place of the largest coordinate.
+/// Rounding error of bounds: four units in the last place of the largest coordinate.
 fn rounding(aabb: &Aabb) -> f32 {
     4.0 * f32::EPSILON * aabb.min.abs().max(aabb.max.abs()).max_element()
 }
@@ -393,7 +396,7 @@ fn assortment() -> [Shape; 5] {
     ]
 }
 
-/// A world goes the same way whatever finds its pairs.
+/// A world evolves the same way whichever broad phase finds its pairs.
 #[test]
 fn worlds_do_not_depend_on_the_kind() {
     for name in ["pyramid:12", "circle_pile:120", "smash"] {

@@ -1,4 +1,4 @@
-//! What several test files share.
+//! Helpers shared by several test files.
 #![allow(dead_code)]
 
 use simpulse::engine::lanes::LaneWidth;
@@ -16,8 +16,8 @@ pub fn with_width(variant: &'static Variant, width: LaneWidth) -> Settings {
     Settings::new(variant).exactly(width)
 }
 
-/// A scene of the catalog, or `crowded_plate`: one dynamic plate under more bodies than
-/// there are colors, so that contacts overflow, on a kinematic plate that moves sideways.
+/// A scene of the catalog, or `crowded_plate`: one dynamic plate under more bodies than there are colors, so
+/// that contacts overflow. The plate lies on a kinematic plate that moves sideways.
 pub fn scene(name: &str) -> Scene {
     if name != "crowded_plate" {
         return scenes::load(name).unwrap().scene;
@@ -60,7 +60,7 @@ pub fn totals(world: &World) -> [f64; 4] {
     })
 }
 
-/// Greatest speed of a body (m/s).
+/// Largest speed of a body (m/s).
 pub fn fastest(world: &World) -> f32 {
     (0..world.bodies.len()).map(|i| world.bodies.velocity(i).length()).fold(0.0, f32::max)
 }

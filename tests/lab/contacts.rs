@@ -1,4 +1,4 @@
-//! Law: contacts that are kept and updated in place are those that a fresh look finds.
+//! Law: contacts kept and updated in place equal contacts found from scratch.
 
 use simpulse::engine::broadphase::{Proxy, all_pairs};
 use simpulse::engine::contacts::Contact;
@@ -9,8 +9,8 @@ use simpulse::engine::solvers::find;
 use simpulse::engine::world::World;
 use simpulse::lab::scenes::Scene;
 
-/// The contacts of the coming step from nothing: every pair of shapes, collided one by one, with
-/// the impulses of `last` by feature.
+/// The contacts of the coming step from scratch: every pair of shapes is collided on its own. Points take the
+/// impulses of `last` by feature.
 fn from_nothing(world: &World, last: &[Contact]) -> Vec<Contact> {
     let bodies = &world.bodies;
     let proxies: Vec<Proxy> = world
@@ -32,7 +32,7 @@ fn from_nothing(world: &World, last: &[Contact]) -> Vec<Contact> {
         let [body_a, body_b] = [a, b].map(|shape| world.shape_body[shape as usize]);
         let [pose_a, pose_b] = bodies.relative_poses(body_a as usize, body_b as usize);
         let [shape_a, shape_b] = [a, b].map(|shape| &world.shapes[shape as usize]);
-        // What bodies do in the coming step and a quarter.
+        // Motion of the bodies over 1.25 steps.
         let ways = [body_a, body_b].map(|body| {
             let (v, dt) = (bodies.velocity(body as usize), 1.25 * world.settings.dt);
             [dt * v.x, dt * v.y, dt * bodies.angular_velocity[body as usize], 0.0]
@@ -57,7 +57,7 @@ fn from_nothing(world: &World, last: &[Contact]) -> Vec<Contact> {
     contacts
 }
 
-/// Scenes in which contacts begin, end and slide, of every kind of pair.
+/// Scenes in which contacts begin, end and slide, with every kind of pair.
 const SCENES: &[(&str, u32)] = &[
     ("crowded_plate", 60),
     ("circle_pile:60", 120),
@@ -109,7 +109,7 @@ fn a_list_that_the_caller_cut_is_found_again() {
     world.step().unwrap();
 }
 
-/// Arms (m) of the single contact between a body of `kind` and a dynamic one, 0.2 m deep in each other.
+/// Arms (m) of the single contact between a body of `kind` and a dynamic body that overlap by 0.2 m.
 fn arms(kind: &str, shapes: [&str; 2]) -> [f32; 2] {
     let text = format!(
         r#"{{"name":"pair","gravity":[0,0],"bodies":[

@@ -1,4 +1,5 @@
-//! Continuous collision: nothing fast gets through, nothing slow is touched, and lanes do not matter.
+//! Continuous collision: fast bodies do not pass through, slow bodies are unaffected, and lanes do not
+//! matter.
 
 use crate::common::{run, settings, with_width};
 use simpulse::engine::bodies::BodyKind;
@@ -12,7 +13,7 @@ fn on(variant: &'static Variant) -> Settings {
     Settings { continuous: true, ..settings(variant) }
 }
 
-/// A wall of 1 cm at x = 0, and `what` that flies at it with 300 m/s from 7.3 m off.
+/// A `target` of 1 cm at x = 0, and `what` flying at it at 300 m/s from 7.3 m away.
 fn shot(what: SceneShape, target: SceneBody, bullet: bool) -> Scene {
     let body = SceneBody { bullet, ..SceneBody::dynamic([-7.3, 0.1], what) };
     Scene::new("shot", vec![target, body.moving([300.0, 0.0], 20.0)]).weightless()
@@ -35,7 +36,7 @@ fn a_bullet_stops_at_a_wall_under_every_solver_and_without_goes_through() {
             let mut scene = shot(shape.clone(), wall(), false);
             scene.bodies[1].position[0] += 0.02 * k;
             scene.bodies[1].angular_velocity -= 2.0 * k;
-            // Not a number where the solver diverges.
+            // NaN if the solver diverges.
             let x = |settings| {
                 let mut world = scene.build(settings).unwrap();
                 let ends = (0..60).all(|_| world.step().is_ok());
@@ -59,11 +60,11 @@ fn a_bullet_stops_at_a_wall_under_every_solver_and_without_goes_through() {
     }
 }
 
-/// Solvers under which the first shot gets through in the end, or that diverge.
+/// Solvers under which the first shot eventually gets through, or that diverge.
 const KNOWN_AT_FIRST: [&str; 6] = ["pgs_soft", "jacobi", "mass_splitting", "tgs_soft", "tgs_sticky", "physx"];
 
-/// The same of all shots, and how many of 90: what stops deep in the contact and
-/// spins may go on through in the steps that follow, since rotation is not traced.
+/// The same for all 90 shots, with the largest allowed number of failures. A body that stops deep in the
+/// contact and spins may pass through in later steps, since rotation is not traced.
 const KNOWN: [(&str, u32); 12] = [
     ("projection", 6),
     ("pgs_soft", 3),
@@ -126,12 +127,12 @@ fn fast_bodies_stay_in_their_rooms() {
         (0..60).filter(|&n| run_solver(&case(n), settings).unwrap().has(TortureVerdict::Escaped)).count()
     };
     assert_eq!(escapes(&on(soft_step)), 0);
-    // Else the scenes would be too easy.
+    // Otherwise the scenes would be too easy.
     assert!(escapes(&settings(soft_step)) > 20);
     assert_eq!(escapes(&settings(find("shim").unwrap())), 0);
 }
 
-/// A box between a wall of 2 m and a door that comes at it with 1 m/s and goes on into the wall.
+/// A box between a wall 2 m thick and a door that moves toward it at 1 m/s and on into the wall.
 #[test]
 fn what_a_door_presses_does_not_leave_through_the_wall() {
     let still =
@@ -156,7 +157,8 @@ fn what_a_door_presses_does_not_leave_through_the_wall() {
     }
 }
 
-/// A rod on its tip, with another body on it, tips over: it is not held where it is while its speed grows.
+/// A rod on its tip with another body on it tips over. Continuous collision must not hold it in place while
+/// its speed grows.
 #[test]
 fn what_stands_on_its_tip_tips_over() {
     let case = family("drops").unwrap().case(1, 19);

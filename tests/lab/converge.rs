@@ -30,7 +30,7 @@ fn frozen_files() -> Vec<PathBuf> {
     files
 }
 
-/// Untimed runs of these solvers.
+/// Runs of these solvers without timing.
 fn options(solvers: &[&str]) -> ConvergeOptions {
     let solvers = solvers.iter().map(|name| solvers::find(name).unwrap()).collect();
     ConvergeOptions { solvers, rounds: 0, ..ConvergeOptions::default() }
@@ -40,9 +40,9 @@ fn run(problem: &ContactProblem, solvers: &[&str]) -> ConvergeReport {
     converge(problem, Some(&reference(problem).unwrap()), &options(solvers)).unwrap()
 }
 
-/// Rates are fitted over one decade that ends 100 times above the rounding floor. There rounding
-/// may change a residual by 1 %; a line through a decade, its ends pulling 1.5 times as much as
-/// their share, then errs by 1.5 · 0.01/ln 10 = 0.7 % of ln ρ, some 0.7 % of 1 − ρ.
+/// Rates are fitted over one decade that ends 100 times above the rounding floor. There, rounding may change
+/// a residual by 1 %. A line fitted through a decade, where the ends count 1.5 times their share, is then off
+/// by 1.5 · 0.01/ln 10 = 0.7 % of ln ρ, about 0.7 % of 1 − ρ.
 fn assert_rate(curve: &ReplayCurve, exact: f64) {
     let measured = curve.rigid.rate.unwrap();
     let (solver, order) = (&curve.solver, curve.order);
@@ -58,12 +58,14 @@ fn a_column_converges_at_the_rate_of_its_walk_in_every_order() {
         // Three orders, cold and warm.
         assert_eq!(curves.len(), 6);
         for curve in curves {
-            // Warm, what is left of the slowest mode may still be less than what is left of others.
+            // With a warm start, the remainder of the slowest mode may still be smaller than that of other
+            // modes.
             if curve.start == Start::Cold {
                 assert_rate(curve, (PI / (2 * n) as f64).cos().powi(2));
             }
-            // The same to the iteration as f64 in the same order, as long as f32 is exact enough.
-            // Cold, all orders begin with the same smooth error; warm, there is one of every wave length.
+            // The same iteration count as f64 in the same order, as long as f32 is exact enough. From a cold
+            // start, all orders begin with the same smooth error. A warm start has errors of every
+            // wavelength.
             let order = if curve.start == Start::Cold { Sequence::Natural } else { curve.order };
             let of =
                 |c: &&ReplayCurve| c.solver == "Gauss-Seidel" && c.start == curve.start && c.order == order;
@@ -79,8 +81,8 @@ fn a_column_converges_at_the_rate_of_its_walk_in_every_order() {
     }
 }
 
-/// See [`hanging_chain`]: the residual falls by cos²(π/2n) per sweep, and a decade takes ln 10/−ln cos²(π/2n) ≈ 0.933 n² of them.
-/// The chain is a tree, so every order has the same rate.
+/// See [`hanging_chain`]: the residual falls by cos²(π/2n) per sweep, so a decade takes
+/// ln 10/−ln cos²(π/2n) ≈ 0.933 n² sweeps. The chain is a tree, so every order has the same rate.
 #[test]
 fn sweeps_of_a_chain_of_joints_grow_with_the_square_of_its_links() {
     let mut decades = Vec::new();
@@ -105,7 +107,7 @@ fn sweeps_of_a_chain_of_joints_grow_with_the_square_of_its_links() {
     assert!((decades[2] / decades[0] - 16.0).abs() < 1.5, "{decades:?}");
 }
 
-/// Contacts and joints of every law at once. What each solver is to reach: its own law, to the floor.
+/// Contacts and joints of every law at once. Each solver must reach its own law, down to the floor.
 #[test]
 fn every_solver_converges_on_a_machine_with_contacts_motors_limits_and_springs() {
     let problem = machine();
@@ -119,7 +121,7 @@ fn every_solver_converges_on_a_machine_with_contacts_motors_limits_and_springs()
             assert!(own < 1e-4, "{name} {order}: {own:e}");
         }
     }
-    // Those of the rigid law end at the certified velocities, whatever their method is.
+    // Solvers of the rigid law end at the certified velocities, whatever their method.
     for name in
         ["pgs", "nncg", "anderson", "symmetric_gs", "random_order", "apgd", "admm", "direct", "tgs_ngs"]
     {
@@ -132,8 +134,8 @@ fn every_solver_converges_on_a_machine_with_contacts_motors_limits_and_springs()
     }
 }
 
-/// The rows of a captured scene are those that the step solves: a long run of sweeps on them ends at the velocities of the
-/// step itself.
+/// The rows of a captured scene are the rows that the step solves: a long run of sweeps on them ends at the
+/// velocities of the step itself.
 #[test]
 fn a_captured_step_with_joints_is_the_step() {
     for (scene, step) in [("crane", 30), ("ball_and_chain", 40)] {
@@ -158,7 +160,7 @@ fn a_captured_step_with_joints_is_the_step() {
             let b = &world.bodies;
             for (found, exact) in found.iter().zip([b.velocity_x[i], b.velocity_y[i], b.angular_velocity[i]])
             {
-                // Free velocities are rounded differently; everything else is the same arithmetic.
+                // Free velocities round differently. Everything else is the same arithmetic.
                 assert!(
                     (found - f64::from(exact)).abs() < 2e-4 * (1.0 + found.abs()),
                     "{scene} {i}: {found} {exact}"
@@ -180,9 +182,9 @@ fn heavy_on_light_converges_at_the_mass_ratio_over_one_more() {
 
 #[test]
 fn mass_splitting_on_a_column_is_a_lazy_walk() {
-    // Rows x ← x/2 + (neighbors)/4 inside, x₀/2 + x₁/2 at the ground, x/3 + x₋₁/3 at the top,
-    // where the last disc has one contact only. Modes are cos iθ with the eigenvalue
-    // (1 + cos θ)/2, and the top row asks for tan((n − 1)θ) tan(θ/2) = 1/2.
+    // Rows x ← x/2 + (neighbors)/4 inside, x₀/2 + x₁/2 at the ground, x/3 + x₋₁/3 at the top, where the last
+    // disc has only one contact. Modes are cos iθ with the eigenvalue (1 + cos θ)/2, and the top row requires
+    // tan((n − 1)θ) tan(θ/2) = 1/2.
     let n = 10;
     let excess = |theta: f64| ((n - 1) as f64 * theta).tan() * (theta / 2.0).tan() - 0.5;
     let (mut low, mut high) = (0.0, PI / 2.0 / (n - 1) as f64);
@@ -193,7 +195,7 @@ fn mass_splitting_on_a_column_is_a_lazy_walk() {
     let exact = (1.0 + low.cos()) / 2.0;
     let report = run(&disc_column(n), &["pgs"]);
     let rate = |name: &str| report.curves.iter().find(|c| c.solver == name).unwrap().rigid.rate.unwrap();
-    // The next modes still hold some 1e-3 of the residual over the first thousand iterations.
+    // The next modes still hold about 1e-3 of the residual over the first thousand iterations.
     assert!((rate("Jacobi, mass splitting") - exact).abs() < 2e-5, "{exact}");
     assert!((rate("Jacobi") - (PI / (2 * n) as f64).cos()).abs() < 1e-3);
 }
@@ -212,11 +214,11 @@ fn files_converge_to_the_floor_and_to_their_certified_velocities() {
         let report = converge(&problem, Some(&reference), &settings).unwrap();
         for curve in report.curves.iter().filter(|c| c.arithmetic == "f32") {
             let last = curve.points.last().unwrap();
-            // A row sums a handful of products of that size; 20 roundings are generous.
+            // A row sums a handful of products of that size; 20 roundings are a generous bound.
             assert!(last.rigid < 20.0 * floor, "{}: {} {:e}", file.display(), curve.order, last.rigid);
-            // A residual r that falls by ρ per sweep is followed by r (1 + ρ + ρ² + …) of change:
-            // r/(1 − ρ) is what is left of the error. Two bodies answer to each row, and where a
-            // rate could not be fitted, a decade took fewer than four sweeps: ρ < 0.6.
+            // A residual r that falls by ρ per sweep is followed by changes of r (1 + ρ + ρ² + …), so the
+            // remaining error is r/(1 − ρ). Two bodies respond to each row. Where no rate could be fitted, a
+            // decade took fewer than four sweeps: ρ < 0.6.
             let rate = curve.rigid.rate.unwrap_or(0.6);
             let bound = 2.0 * (last.rigid + floor) / (1.0 - rate);
             let error = last.velocity_error.unwrap();
@@ -251,8 +253,7 @@ fn order_matters_until_convergence() {
     };
     let (early, converged) = (spread(4), spread(600));
     assert!(early > 0.05, "{early}");
-    // Where velocities are unique nothing but rounding is left: 6e-8 per operation, gained 1/(1 − ρ)
-    // = 30 times.
+    // Where velocities are unique, only rounding is left: 6e-8 per operation, amplified by 1/(1 − ρ) = 30.
     assert!(converged < 2e-6, "{converged}");
 }
 
@@ -269,15 +270,15 @@ fn soft_contacts_solve_their_own_law_and_not_the_rigid_one() {
     let target = Target::Own(&own.rows);
     let unit = problem.impulse_unit();
     let residual = |target| natural_map(&problem, target, &outcome.velocities, &outcome.impulses) / unit;
-    // A handful of roundings of the largest impulse: in the sweep, and in the law's coefficients.
+    // A handful of roundings of the largest impulse, in the sweep and in the law's coefficients.
     let largest = outcome.impulses.iter().flatten().fold(0.0_f64, |m, l| m.max(l.abs()));
     let floor = 6e-8 * largest / unit;
     assert!(residual(target) < 5.0 * floor && residual(Target::Rigid) > 0.1, "{:e}", residual(target));
-    // f64, by the law alone: the same velocities.
+    // The law alone, in f64, gives the same velocities.
     let cold = vec![[0.0; 2]; problem.contacts.len()];
     let stop = Stop { tolerance: 1e-13, iterations: 10_000 };
     let exact = pgs(&problem, target, &cold, SweepDirection::Forward, stop).velocities;
-    // The coefficients are known to a few roundings of f32.
+    // The coefficients are accurate to a few roundings of f32.
     let error = problem.velocity_error(&outcome.velocities, &exact);
     assert!(error < 2e-6, "{error:e}");
     let report = converge(&problem, None, &options(&["soft_step"])).unwrap();
@@ -288,7 +289,8 @@ fn soft_contacts_solve_their_own_law_and_not_the_rigid_one() {
 
 #[test]
 fn the_start_is_not_the_smallest_residual() {
-    // The relaxation lifts off while sliding: every iterate is farther from the rigid law than no impulse at all.
+    // The convex relaxation lifts off while sliding, so every iterate is farther from the rigid law than zero
+    // impulse.
     let file = frozen_files().into_iter().find(|f| f.ends_with("sliding-box.frozen")).unwrap();
     let Frozen { problem, reference } = Frozen::read(&file).unwrap();
     let report = converge(&problem, reference.as_ref(), &options(&["apgd"])).unwrap();
@@ -300,8 +302,8 @@ fn the_start_is_not_the_smallest_residual() {
 
 #[test]
 fn a_point_whose_load_and_friction_are_one_problem_needs_one_iteration() {
-    // A rod that slides on its lower end: friction presses it down, and load and friction need each other. Slower friction
-    // than sticks, and a rod that slips.
+    // A rod slides on its lower end. Friction presses it down, so load and friction depend on each other.
+    // With a friction coefficient of 2 the end sticks; with 0.4 it slips.
     for friction in [2.0, 0.4] {
         let mut problem = painleve_rod(1.0 / 60.0);
         problem.contacts[0].friction = friction;
@@ -328,11 +330,11 @@ fn every_solver_reaches_its_own_law_on_a_pyramid() {
     let report = converge(&problem, reference.as_ref(), &settings).unwrap();
     for curve in report.curves.iter().filter(|c| c.arithmetic == "f32") {
         assert!(curve.own.first[5].is_some(), "{} {} {:?}", curve.solver, curve.order, curve.own);
-        // The first k within a tolerance is the first indeed.
+        // No earlier k is within the tolerance.
         for (first, tolerance) in curve.own.first.iter().zip(report.tolerances) {
             let at = curve.points[first.unwrap()];
             assert!(at.own.unwrap() <= tolerance);
-            // What comes before the iterations may be enough for the first tolerances.
+            // The state before the iterations may already meet the first tolerances.
             let before = curve.points[..first.unwrap()].last().map_or(0, |before| before.iterations + 1);
             assert_eq!(before, at.iterations, "{} {}", curve.solver, curve.order);
         }
@@ -356,7 +358,7 @@ fn exchanged_sides_are_the_same_problem() {
     }
 }
 
-/// A scene some steps on.
+/// A scene after some steps.
 fn world(name: &str, variant: &'static Variant, budget: Budget, order: Order, steps: u32) -> World {
     let mut settings = crate::common::settings(variant);
     (settings.budget, settings.order) = (budget, order);
@@ -366,7 +368,8 @@ fn world(name: &str, variant: &'static Variant, budget: Budget, order: Order, st
     crate::common::run(&crate::common::scene(name), settings, steps)
 }
 
-/// Newton's steps go in circles on the thrust of an arch, whatever its warm start is; small islands are pivoted then.
+/// Newton's steps cycle on the thrust of an arch, whatever the warm start. Small islands then fall back to
+/// pivoting.
 #[test]
 fn newton_and_lemke_together_solve_an_arch_from_any_start() {
     let pgs = solvers::find("pgs").unwrap();
@@ -398,7 +401,7 @@ fn capture_looks_and_does_not_touch() {
         assert_eq!(body.inv_inertia, f64::from(left_alone.bodies.inv_inertia[i]));
         assert_eq!(body.free_velocity[1], body.velocity[1] - 10.0 * problem.h);
     }
-    // At rest the warm-start impulses of the whole step carry the weight: 15 m g h on the ground.
+    // At rest, the warm-start impulses of the whole step carry the weight: 15 m g h on the ground.
     let on_ground: f64 =
         problem.contacts.iter().filter(|c| c.body_a.is_none()).map(|c| c.warm_impulse[0]).sum();
     let weight = problem.total_load();
@@ -422,7 +425,7 @@ fn what_is_written_is_what_is_read() {
 #[test]
 fn a_replayed_problem_is_the_step_of_the_world() {
     for name in ["pyramid:5", "disc_column:8", "card_house"] {
-        // What diverges makes any difference large.
+        // Divergence would make any difference large.
         for variant in VARIANTS.iter().filter(|v| v.promises(Law::Converges)) {
             let budget = Budget { substeps: 1, ..variant.budget };
             for (order, sequence) in
@@ -440,10 +443,10 @@ fn a_replayed_problem_is_the_step_of_the_world() {
                 for (replayed, &i) in velocities.iter().zip(&moves) {
                     for (replayed, stepped) in replayed.iter().zip(rows[i].velocity) {
                         let difference = (replayed - f64::from(stepped)).abs();
-                        // Arms and v* differ in their last bits, 6e-8 of numbers near 1; a step
-                        // makes of that a few 1e-7 per sweep.
-                        // Mixing divides by what residuals differ from sweep to sweep, 1 − ρ of them, and sweeps of
-                        // five rows have the rate ρ = cos²(π/10) = 0.904.
+                        // Arms and v* differ in their last bits, 6e-8 of numbers near 1. A step turns that
+                        // into a few 1e-7 per sweep. Anderson mixing divides by the change of the residuals
+                        // from sweep to sweep, a fraction 1 − ρ of them. Sweeps of five rows have the rate
+                        // ρ = cos²(π/10) = 0.904.
                         let bound = if variant.name == "anderson" { 1e-5 / (1.0 - 0.904) } else { 1e-5 };
                         assert!(difference < bound, "{name} {} {order:?}, {i}: {difference:e}", variant.name);
                     }
@@ -469,12 +472,12 @@ fn reports_say_what_was_measured() {
     let svg = plot::svg(&report, &|_| Color::rgb(0)).unwrap();
     assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>") && !svg.contains("NaN"));
 
-    // Without a reference there is nothing to draw warm starts around.
+    // Without a reference, there is nothing to perturb into a warm start.
     let cold = converge(&problem, None, &options(&["pgs"])).unwrap();
     assert!(cold.curves.iter().all(|c| c.start == Start::Cold));
     assert!(table::text(&cold).contains("No warm starts"), "{}", table::text(&cold));
 
-    // Impulses of the problem's own come first. Warm rows are there only for solvers that make use of them.
+    // Impulses stored in the problem take precedence. Only solvers that use warm starts have warm rows.
     let mut warm = problem;
     warm.contacts.iter_mut().for_each(|c| c.warm_impulse = [0.1, 0.0]);
     let report = run(&warm, &["pgs", "projection", "avbd"]);
@@ -486,8 +489,8 @@ fn reports_say_what_was_measured() {
     assert!(text.contains("bias and compliance of normal rows): avbd."), "{text}");
 }
 
-/// `mazhar2015`: f(λ_k) − f(λ*) ≤ 2 L |λ*|²/(k + 1)² from zero, f = λᵀ G λ/2 + λᵀ b with Lipschitz constant L = ‖G‖ of
-/// its gradient. A step of the solver's own is never longer than one of 1/L, and restarts only help.
+/// `mazhar2015`: f(λ_k) − f(λ*) ≤ 2 L |λ*|²/(k + 1)² from zero, with f = λᵀ G λ/2 + λᵀ b and L = ‖G‖ the
+/// Lipschitz constant of its gradient. The solver's own step length replaces 1/L, and restarts only help.
 #[test]
 fn the_objective_of_accelerated_gradients_falls_with_the_square_of_iterations() {
     let problem = disc_column(20);
@@ -499,7 +502,7 @@ fn the_objective_of_accelerated_gradients_falls_with_the_square_of_iterations() 
         impulses.iter().zip(&product).zip(&free).map(one).sum::<f64>()
     };
     let least = objective(&truth.impulses);
-    // Rows of G of equal discs: −1, 2, −1 over the mass, here 1 kg; ‖G‖ < 4.
+    // Rows of G for equal discs: −1, 2, −1 over the mass, here 1 kg; ‖G‖ < 4.
     assert!(problem.bodies.iter().all(|b| b.inv_mass == 1.0));
     let square: f64 = truth.impulses.iter().map(|l| l[0] * l[0]).sum();
     let apgd = solvers::find("apgd").unwrap();
@@ -513,7 +516,7 @@ fn the_objective_of_accelerated_gradients_falls_with_the_square_of_iterations() 
     }
 }
 
-/// `anitescu2006`: where the convex relaxation slides, it parts at un = µ |ut|.
+/// `anitescu2006`: where the convex relaxation slides, surfaces separate at un = µ |ut|.
 #[test]
 fn the_relaxation_parts_in_proportion_to_sliding() {
     let problem = sliding_box();
@@ -533,7 +536,7 @@ fn the_relaxation_parts_in_proportion_to_sliding() {
     assert!(pushing > 0);
 }
 
-/// `tonge2012`: the result does not depend on the order, and from zero nothing rises on the way.
+/// `tonge2012`: the result does not depend on the order, and from zero the residual never rises.
 #[test]
 fn split_masses_converge_without_rising_and_in_any_order() {
     for file in ["box-pyramid-5", "disc-column-10", "plank-4-supports"] {
@@ -547,7 +550,7 @@ fn split_masses_converge_without_rising_and_in_any_order() {
         for curve in &curves {
             for pair in curve.points.windows(2).filter(|pair| pair[1].rigid > 1e-5) {
                 let [before, after] = [pair[0].rigid, pair[1].rigid];
-                // Sums of f32 in another order.
+                // f32 sums in a different order.
                 assert!(after < 1.005 * before, "{}: {before:e}, {after:e}", file.display());
             }
             for (x, y) in curve.points.iter().zip(&curves[0].points) {
@@ -576,8 +579,8 @@ fn warm_starts_spare_block_descent_the_growth_of_its_penalties() {
     }
 }
 
-/// From zero penalties are soft beside the inertia of bodies, and orders differ in rounding alone. With stiff
-/// ones they must not.
+/// From zero, penalties are soft compared with the inertia of bodies, and orders differ by rounding only.
+/// With stiff penalties they must differ by more.
 #[test]
 fn the_order_of_contacts_is_that_of_bodies_in_block_descent() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/frozen/box-pyramid-5.frozen");

@@ -1,4 +1,4 @@
-//! Laws of impacts with restitution, under the solver that has them at their time.
+//! Laws of impacts with restitution, under the solver that resolves them at their time of impact.
 
 use super::common::totals;
 use proptest::prelude::*;
@@ -10,7 +10,7 @@ use simpulse::engine::solvers::{DEFAULT, find};
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 
-/// Rough boxes in a row that fly against the next one, each.
+/// A row of rough boxes, each flying toward the next.
 fn row(
     angles: &[f64],
     slenderness: &[f64],
@@ -21,7 +21,7 @@ fn row(
 ) -> Vec<SceneBody> {
     let mut bodies = Vec::new();
     for (k, angle) in angles.iter().enumerate() {
-        // At 1.2 m, none longer than 0.5 m on either side of its center.
+        // 1.2 m apart, none longer than 0.5 m on either side of its center.
         let x = 1.2 * k as f64;
         let shape = SceneShape::rectangle(0.45, 0.2 * slenderness[k]).friction(friction).restitution(e);
         let [vx, vy] = velocities[k];
@@ -34,17 +34,20 @@ fn row(
     bodies
 }
 
-/// Energy that the steps of the row make, at most of all steps, over that of the beginning; and the same over a bound.
+/// Largest energy gain in one step of the row, relative to the initial energy, and relative to a bound.
 ///
-/// Waves of impacts alone: without sweeps nothing else changes velocities, and without weight every approach bounces. In exact
-/// numbers no wave makes energy (`spread/law.rs`): W ≤ 0 at each point, and ΔK = Σ W. What rounding and the tolerance of the
-/// waves add, with ΣN all normal impulses of the step and V the largest relative velocity of two points:
+/// Only waves of impacts act: there are no sweeps that change velocities, and without gravity every approach
+/// bounces. In exact arithmetic no wave creates energy (`spread/law.rs`): W ≤ 0 at each point, and ΔK = Σ W.
+/// Rounding and the tolerance of the waves add the following. ΣN are all normal impulses of the step, and V
+/// is the largest relative velocity of two points.
 ///
-/// * A wave ends when no point would gain more than τ = 10⁻⁶ V along n. Of boxes k_tt ≤ 4 k_nn and |k_nt| ≤ 3/2 k_nn, because
-///   r² m/I ≤ 3, so velocities are within 5/2 τ along n and 11/2 τ along t, and W ≤ ½ N 5/2 τ + ½ µN 11/2 τ.
-/// * Friction is bounded by the energy that is lost, and 10⁻⁶ v⁺ ≤ τ more: W ≤ ½ N τ.
-/// * Velocities have 24 bits: ε = 2⁻²⁴ of each of two components and of the spin, of which ΔK has 2 m v ε v per body, 4 ε K in
-///   all, before and after; impulses from three products and sums each, 4 ε (1 + µ) N V on two bodies.
+/// * A wave ends when no point would gain more than τ = 10⁻⁶ V along n. For boxes k_tt ≤ 4 k_nn and
+///   |k_nt| ≤ 3/2 k_nn, because r² m/I ≤ 3. So velocities are within 5/2 τ along n and 11/2 τ along t, and
+///   W ≤ ½ N 5/2 τ + ½ µN 11/2 τ.
+/// * Friction is bounded by the energy that is lost, plus 10⁻⁶ v⁺ ≤ τ: W ≤ ½ N τ.
+/// * Velocities have 24 bits: ε = 2⁻²⁴ for each of two components and for the spin. This gives ΔK an error of
+///   2 m v ε v per body, 4 ε K in total, before and after. Impulses come from three products and sums each:
+///   4 ε (1 + µ) N V on two bodies.
 fn most_made_by_waves(bodies: Vec<SceneBody>, friction: f64) -> [f64; 2] {
     let (mut settings, radius) = (crate::common::settings(find("pgs").unwrap()), 0.5);
     settings.impacts = Impacts::Waves;
@@ -76,7 +79,7 @@ fn most_made_by_waves(bodies: Vec<SceneBody>, friction: f64) -> [f64; 2] {
     made
 }
 
-/// The most energy that a whole step makes, over that of the beginning.
+/// Largest energy gain of a whole step, relative to the initial energy.
 fn most_made(bodies: Vec<SceneBody>) -> f64 {
     let mut world = Scene::new("rough", bodies)
         .weightless()
@@ -93,8 +96,8 @@ fn most_made(bodies: Vec<SceneBody>) -> f64 {
     most
 }
 
-/// Two slender boxes between rough walls, whose corners are hit again and again: 4.28 J became 5.25 J in a step where
-/// each point had Newton's restitution with Coulomb's friction.
+/// Two slender boxes between rough walls, with repeated corner hits. With Newton's restitution and Coulomb's
+/// friction at each point, 4.28 J became 5.25 J in one step.
 #[test]
 fn corners_between_walls_make_no_energy() {
     let [friction, e] = [1.15287545158135, 0.9860742884007992];
@@ -112,7 +115,7 @@ fn corners_between_walls_make_no_energy() {
     assert!(of_bound < 1.0, "{made} of the energy in one step, {of_bound} of the bound");
 }
 
-/// Smooth elastic boxes in a closed one, without weight.
+/// Frictionless elastic boxes in a closed box, without gravity.
 fn gas(seed: u32) -> Scene {
     let smooth = |shape: SceneShape| shape.friction(0.0).restitution(1.0);
     let wall =
@@ -124,7 +127,7 @@ fn gas(seed: u32) -> Scene {
         wall([9.0, 0.0], [1.0, 8.0]),
     ];
     for k in 0..25 {
-        // Parts of the golden section: anything that does not repeat.
+        // Fractional parts of multiples of the golden ratio: any sequence that does not repeat.
         let any = |n: u32| (f64::from(25 * n + k + seed) * 0.618_034).fract() * 2.0 - 1.0;
         let at = [f64::from(k % 5), f64::from(k / 5)].map(|i| 2.5 * (i - 2.0));
         let body = SceneBody::dynamic(at, smooth(SceneShape::rectangle(0.5, 0.3)));
@@ -133,8 +136,8 @@ fn gas(seed: u32) -> Scene {
     Scene::new("gas", bodies).weightless()
 }
 
-/// Over many gases, since the end of one depends on rounding. Frames of the moment of touch cost energy: 1.3 % rms in 1200
-/// steps, of either sign. Without them it is 0.02 %.
+/// Averaged over many gases, since the end of a single one depends on rounding. Contact frames of the moment
+/// of touch change the energy by 1.3 % rms in 1200 steps, of either sign. Without them the change is 0.02 %.
 #[test]
 fn gases_of_smooth_elastic_boxes_keep_their_energy() {
     let shim = find(DEFAULT).unwrap();
@@ -172,11 +175,12 @@ fn its_bits_are_the_same_at_every_width() {
     assert!(all.windows(2).all(|pair| pair[0] == pair[1]));
 }
 
-/// What is left in a step to springs, which push out what overlaps, may make so much of the energy of the beginning.
+/// Fraction of the initial energy that springs, which push apart remaining overlap, may add in a step.
 const MADE: f64 = 0.02;
 
 proptest! {
-    /// Two discs that meet anywhere, at any time within a step, keep both momenta; smooth ones leave as Newton's law has it.
+    /// Two discs that meet anywhere, at any time within a step, conserve both momenta. Frictionless discs
+    /// leave as Newton's law requires.
     #[test]
     fn discs_meet_where_they_touch(
         offset in -0.9f64..0.9,
@@ -212,8 +216,9 @@ proptest! {
     }
 }
 
-/// Four slender boxes of which one is pushed into the next by what comes behind: 3.5 % of the energy in a step, the most
-/// of some thousand random rows. What is left in each other by flight is pushed apart by springs, at up to 3 m/s.
+/// Four slender boxes, one of which is pushed into the next by those behind it. They gain 3.5 % of their
+/// energy in one step, the most among about a thousand random rows. Springs push apart the overlap left by
+/// flight, at up to 3 m/s.
 #[test]
 #[ignore = "makes 3.5 % of its energy in one step"]
 fn a_row_of_slender_boxes_makes_no_energy() {
@@ -234,10 +239,10 @@ fn a_row_of_slender_boxes_makes_no_energy() {
 }
 
 proptest! {
-    // Of one row in some thousand it is known that it makes more: see above.
+    // About one row in a thousand is known to gain more: see above.
     #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(7), ..ProptestConfig::default() })]
 
-    /// Rough bodies with any edges that meet at any angle make no energy.
+    /// Rough bodies with any edges that meet at any angle gain no energy.
     #[test]
     fn rough_impacts_make_no_energy(
         angles in prop::collection::vec(-3.1f64..3.1, 2..5),

@@ -1,9 +1,9 @@
-//! Law: what a scene does not need costs nothing, and leaving it out changes nothing.
+//! Law: features that a scene does not use cost nothing, and dropping them changes nothing.
 
 use simpulse::engine::constraints::{Features, Impacts, Layout, OppositeKind};
 use simpulse::engine::solvers::{VARIANTS, find};
 
-/// Scenes, what each needs, and what it does without.
+/// Scenes and the features that each of them uses.
 fn scenes() -> [(&'static str, Features); 5] {
     let none = Features::NONE;
     [
@@ -49,7 +49,8 @@ fn needs_are_read_off_the_scene() {
 #[test]
 fn the_specialized_and_the_full_kernel_give_the_same_bits() {
     for (name, features) in scenes() {
-        // The moments of levels in `two_level` come from arms, which records of discs without friction do not have.
+        // `two_level` computes the moments of its levels from arms. Records of frictionless discs have no
+        // arms.
         let has_arms = |solver: &str| solver != "two_level" || features.rotation;
         for variant in VARIANTS.iter().filter(|variant| has_arms(variant.name)) {
             let mut settings = crate::common::settings(variant);
@@ -64,7 +65,7 @@ fn the_specialized_and_the_full_kernel_give_the_same_bits() {
             }
             assert!(special.counts.contacts > 4, "{name}: only {} contacts", special.counts.contacts);
             let bytes = (special.counts.constraint_bytes, full.counts.constraint_bytes);
-            // Restitution alone adds nothing: impacts before the step have no records of their own.
+            // Restitution alone adds nothing: impacts before the step have no records.
             let needs = special.features();
             let has_all = needs.rotation && needs.friction && needs.two_points;
             assert!(bytes.0 < bytes.1 || has_all && bytes.0 == bytes.1, "{name} {}: {bytes:?}", variant.name);

@@ -1,11 +1,11 @@
 //! Law: a change that should not change results does not.
 //!
-//! A hash of every bit of the final state, for every scene under every solver. Hashes catch change, not error: where a
-//! change is meant, `SIMPULSE_BLESS=1 cargo test --release --test lab golden` writes the file again, and the diff says which
-//! solvers and which scenes it reached.
+//! A hash of every bit of the final state, for every scene under every solver. Hashes detect change, not
+//! error. After an intended change, `SIMPULSE_BLESS=1 cargo test --release --test lab golden` rewrites the
+//! file, and the diff shows which solvers and scenes are affected.
 //!
-//! They hold for every build with fused multiply-adds (`target-cpu=x86-64-v3` and above); without them each multiply-add
-//! rounds twice and the bits differ.
+//! The hashes hold for every build with fused multiply-adds (`target-cpu=x86-64-v3` and above). Without them,
+//! each multiply-add rounds twice and the bits differ.
 
 use crate::common::settings;
 use simpulse::engine::solvers::{VARIANTS, Variant};
@@ -22,14 +22,14 @@ fn fold(hash: u64, word: u64) -> u64 {
 
 const START: u64 = 0xcbf2_9ce4_8422_2325;
 
-/// The final state of a scene under a solver; a divergence is a state, too, and so is that it has joints where the solver
-/// holds none.
+/// Hash of the final state of a scene under a solver. Divergence counts as a state. So do joints that the
+/// solver does not support.
 fn hash_of(scene: &scenes::Scene, variant: &'static Variant) -> u64 {
     if scene.runs_on(variant).is_err() {
         return START;
     }
     let mut settings = settings(variant);
-    // What takes long in large scenes is cut short.
+    // Large scenes run fewer iterations and steps.
     let work = 100_000 / scene.bodies.len().max(1);
     settings.budget.velocity_iterations = settings.budget.velocity_iterations.min(work.max(8) as u32);
     let mut world = scene.build(settings).unwrap();
@@ -42,8 +42,8 @@ fn hash_of(scene: &scenes::Scene, variant: &'static Variant) -> u64 {
     fold(world.state_hash(), world.step_index)
 }
 
-/// One line per solver over all scenes without joints, one over those with joints where it holds them, and one per scene over
-/// all solvers.
+/// One line per solver over all scenes without joints, one per solver that supports joints over all scenes
+/// with joints, and one per scene over all solvers.
 fn all_hashes() -> String {
     let names: Vec<&str> = CATALOG.iter().map(|entry| entry.name).collect();
     let scenes: Vec<_> = names.iter().map(|name| scenes::load(name).unwrap().scene).collect();

@@ -1,4 +1,4 @@
-//! Laws of impulses: they push and do not pull, rub within the cone, and come in pairs.
+//! Laws of impulses: they push and never pull, friction stays within its cone, and impulses come in pairs.
 
 use proptest::prelude::*;
 use simpulse::engine::lanes::LaneWidth;
@@ -52,10 +52,10 @@ fn cloud(seed: &[(f64, f64, f64, f64, f64)]) -> Scene {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Impulses come in equal and opposite pairs: linear momentum is kept to rounding. Each body
-    /// collects at most `sweeps × contacts` roundings of half an ulp of its speed; the bound
-    /// below allows 64 ulp of the sum of |m v| per step, and a scatter that lost one impulse of
-    /// typical size would break it by three orders of magnitude.
+    /// Impulses come in equal and opposite pairs, so linear momentum is conserved up to rounding. Each body
+    /// collects at most `sweeps × contacts` roundings of half an ulp of its speed. The bound below allows
+    /// 64 ulp of the sum of |m v| per step. A scatter that lost one impulse of typical size would exceed it
+    /// by three orders of magnitude.
     #[test]
     fn momentum_is_kept(seed in prop::collection::vec(
         (-0.1..0.1, -0.1..0.1, -3.0..3.0, -3.0..3.0, -4.0..4.0), 25), width in 0..4_usize) {

@@ -1,7 +1,8 @@
-//! Law: nothing depends on where one stands, what one measures in, or what is far away.
+//! Law: results do not depend on the frame of reference, on units, or on distant bodies.
 //!
-//! A scene and its image under a symmetry of the laws of motion run side by side for a short time, and the image is
-//! taken back. Times are short, because what rounds differently parts for ever after enough impacts.
+//! A scene and its image under a symmetry of the laws of motion run side by side for a short time. Then the
+//! image is mapped back. Times are short because runs that round differently diverge for good after enough
+//! impacts.
 
 use crate::common::settings;
 use simpulse::engine::bodies::BodyKind;
@@ -16,15 +17,15 @@ use std::path::Path;
 /// Steps of a comparison.
 const STEPS: u32 = 40;
 
-/// A symmetry: what becomes of a scene, and where its image's dynamic bodies are in the scene itself.
+/// A symmetry: the image of a scene, and the map of its dynamic bodies back into the scene.
 struct Symmetry {
     name: &'static str,
     image: fn(&Scene, f64) -> Scene,
-    /// Center of a body of the image, back in the scene.
+    /// Center of a body of the image, mapped back into the scene.
     back: fn([f64; 2], f64) -> [f64; 2],
-    /// From a number in 0..1, what the other two are given.
+    /// Argument of `image` and `back`, from a number in 0..1.
     amount: fn(f64) -> f64,
-    /// Where in the list of so many bodies the image of a body is.
+    /// Index of a body's image, from the number of bodies and the body's index.
     place: fn(usize, usize) -> usize,
 }
 
@@ -69,7 +70,7 @@ fn moved(scene: &Scene, by: f64) -> Scene {
     each(scene, |body| body.position = [body.position[0] + by, body.position[1] - by])
 }
 
-/// Lengths times `factor`, times as they are: velocities and gravity times the same.
+/// Lengths times `factor`, times unchanged: velocities and gravity also scale by `factor`.
 fn scaled(scene: &Scene, factor: f64) -> Scene {
     let long = |p: &mut [f64; 2]| *p = [factor * p[0], factor * p[1]];
     let mut image = each(scene, |body| {
@@ -118,7 +119,7 @@ fn heavier(scene: &Scene, factor: f64) -> Scene {
     each(scene, |body| body.shapes.iter_mut().for_each(|shape| shape.density *= factor))
 }
 
-/// A second scene that has nothing to do with the first, behind it in the list.
+/// Adds an unrelated second scene behind the first in the list.
 fn in_company(scene: &Scene, by: f64) -> Scene {
     let mut image = scene.clone();
     let other = family("ratios").unwrap().case(99, 4).scene;
@@ -135,7 +136,7 @@ fn thrice(scene: &Scene, by: f64) -> Scene {
     image
 }
 
-/// The last body first.
+/// Bodies in reverse order.
 fn reordered(scene: &Scene, _: f64) -> Scene {
     let mut image = scene.clone();
     image.bodies.reverse();
@@ -198,7 +199,8 @@ const SYMMETRIES: [Symmetry; 9] = [
     Symmetry { name: "reordered", image: reordered, back: stays, amount: |u| u, place: |n, i| n - 1 - i },
 ];
 
-/// Times times `factor`, lengths as they are: velocities over it, gravity over its square.
+/// Times multiplied by `factor`, lengths unchanged: velocities are divided by `factor`, gravity by its
+/// square.
 fn stepped(scene: &Scene, factor: f64) -> Scene {
     let slow = |p: [f64; 2], by: f64| [p[0] / by, p[1] / by];
     let image = each(scene, |body| {
@@ -208,8 +210,8 @@ fn stepped(scene: &Scene, factor: f64) -> Scene {
     Scene { gravity: slow(scene.gravity, factor * factor), dt: factor * scene.dt, ..image }
 }
 
-/// Farthest that a body of the scene is from its image after some steps (m); infinite where one of them diverges and the
-/// other does not.
+/// Largest distance between a body of the scene and its image after [`STEPS`] steps (m). Infinite if only one
+/// of the two diverges.
 fn deviation(symmetry: &Symmetry, variant: &'static Variant, scene: &Scene, u: f64) -> f64 {
     let amount = (symmetry.amount)(u);
     let image = (symmetry.image)(scene, amount);
@@ -230,19 +232,19 @@ fn deviation(symmetry: &Symmetry, variant: &'static Variant, scene: &Scene, u: f
     apart.fold(0.0, f64::max)
 }
 
-/// A stack or two, or shapes that fall, near enough to touch within the time.
+/// A stack or two, or falling shapes close enough to touch within the time.
 fn scene(number: u32) -> Scene {
     let family = family(["ratios", "drops", "slender"][number as usize % 3]).unwrap();
     family.case(77, number).scene
 }
 
-/// What rounding may become in [`STEPS`] steps with impacts (m): a hundredth of a body's size.
+/// Allowed effect of rounding after [`STEPS`] steps with impacts (m): a hundredth of a body's size.
 const TOLERANCE: f64 = 1e-2;
 
-/// Scenes of each comparison.
+/// Scenes per comparison.
 const SCENES: u32 = 24;
 
-/// Scenes of [`SCENES`] that part from their image by more than [`TOLERANCE`].
+/// Number of the [`SCENES`] scenes that deviate from their image by more than [`TOLERANCE`].
 fn parted(symmetry: &Symmetry, variant: &'static Variant) -> u32 {
     let apart = |&n: &u32| {
         let u = (f64::from(n) + 0.5) / f64::from(SCENES);
@@ -251,8 +253,8 @@ fn parted(symmetry: &Symmetry, variant: &'static Variant) -> u32 {
     (0..SCENES).filter(apart).count() as u32
 }
 
-/// A power of two rounds nothing, so a scene of another size moves to the same bits, if its length unit goes along. Not under `avbd`, whose
-/// penalties begin at 1 N/m.
+/// A power of two causes no rounding. So a scaled scene moves to the same bits if its length unit is scaled
+/// too. This does not hold for `avbd`, whose penalties begin at 1 N/m.
 #[test]
 fn a_scene_of_another_size_moves_to_the_same_bits() {
     let cases = FAMILIES.iter().zip(0..).map(|(family, number)| family.case(77, number).scene);
@@ -263,7 +265,8 @@ fn a_scene_of_another_size_moves_to_the_same_bits() {
             for factor in [2.0, 1.0 / 32.0] {
                 let image = scaled(scene, factor);
                 let [mut a, mut b] = [scene, &image].map(|s| s.build(settings(variant)).unwrap());
-                // To where one diverges: the speed from which on that is said does not follow the length unit.
+                // Until one diverges: the speed that counts as divergence does not scale with the length
+                // unit.
                 for _ in 0..STEPS {
                     let ends = [a.step(), b.step()];
                     if ends.iter().any(Result::is_err) {
@@ -273,7 +276,7 @@ fn a_scene_of_another_size_moves_to_the_same_bits() {
                 for i in 0..scene.bodies.len() {
                     let [one, other] = [(&a, 1.0), (&b, factor)].map(|(world, size)| {
                         let ([x, y], turn) = (world.bodies.center(i), world.bodies.pose(i).rotation);
-                        // Bits: what has diverged is not a number.
+                        // Compare bits, since diverged values are NaN.
                         ([x / size, y / size].map(f64::to_bits), turn.to_array().map(f32::to_bits))
                     });
                     assert_eq!(one, other, "{} {}", variant.name, scene.name);
@@ -283,8 +286,9 @@ fn a_scene_of_another_size_moves_to_the_same_bits() {
     }
 }
 
-/// What is known: how many of [`SCENES`] scenes part under each symmetry, solver by solver. Present truth, with its
-/// reasons at the head of the file; a solver that is mended changes its line. `SIMPULSE_BLESS=1` writes it.
+/// Known deviations: how many of [`SCENES`] scenes deviate under each symmetry, per solver. The file records
+/// the present state, with reasons at its head. Fixing a solver changes its line. `SIMPULSE_BLESS=1` writes
+/// the file.
 #[test]
 fn every_symmetry_holds_or_is_known_not_to() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/lab/invariance.txt");
@@ -302,7 +306,8 @@ fn every_symmetry_holds_or_is_known_not_to() {
     if cfg!(target_feature = "fma") {
         assert_eq!(known, found, "SIMPULSE_BLESS=1 writes what is so now; the file's head says why");
     }
-    // Without fused multiply-adds other scenes part by rounding: a sixth of the scenes more or fewer at most.
+    // Without fused multiply-adds, rounding makes other scenes deviate: at most a sixth of the scenes more or
+    // fewer.
     let counts = |text: &str| -> Vec<i32> {
         let lines = text.lines().filter(|l| !l.starts_with('#'));
         lines

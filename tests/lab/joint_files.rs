@@ -1,4 +1,4 @@
-//! Joints in scene files: what is refused and how, and what comes back.
+//! Joints in scene files: which are rejected and how, and what is read back.
 
 use crate::common::settings;
 use simpulse::engine::solvers::{VARIANTS, find};
@@ -18,7 +18,7 @@ fn read(joints: &str) -> Result<Scene, String> {
 
 #[test]
 fn bad_joints_are_refused_in_one_line_with_place_and_value() {
-    // The joint; where the error stands, and what it must say.
+    // The joint, the position of the error, and what the message must contain.
     let table = [
         (r#"{"revolute": {"a": 0, "b": 7}}"#, "joints[0].revolute.b: ", "no body 7 among 4"),
         (r#"{"revolute": {"a": 1, "b": 1}}"#, "joints[0].revolute.b: ", "body 1 has no joint to itself"),
@@ -75,7 +75,7 @@ fn every_kind_comes_back_and_runs() {
     assert_eq!(scene.joints.len(), 8);
     let back = Scene::from_json(&scene.to_json(), Path::new("x.json")).unwrap();
     assert_eq!((&back, back.to_json()), (&scene, scene.to_json()));
-    // Six joints on body 2 that pull against each other: Jacobi's sweeps add up what each would do alone.
+    // Six joints on body 2 pull against each other. A Jacobi sweep adds up the corrections of all of them.
     let mut diverged = vec![];
     for solver in VARIANTS.iter().filter(|solver| scene.runs_on(solver).is_ok()) {
         let mut world = scene.build(settings(solver)).unwrap();
@@ -96,7 +96,7 @@ fn a_solver_that_holds_no_joints_says_so_in_one_line() {
         assert!(scene.build(settings(solver)).is_err());
     }
     assert!(scene.runs_on(find("shim").unwrap()).is_ok());
-    // Bodies that do not collide are no rows.
+    // Joints that only prevent collisions have no rows.
     let filter = read(r#"{"filter": {"a": 1, "b": 2}}"#).unwrap();
     assert!(without.iter().all(|solver| filter.runs_on(solver).is_ok()));
 }

@@ -1,4 +1,4 @@
-//! Laws of whole scenes and of the laboratory, a file each.
+//! Laws of whole scenes and of the laboratory, one file per law.
 
 mod ablation;
 mod advise;

@@ -1,4 +1,5 @@
-//! Metrics on real runs: what must be zero, what must not, and what an outsider can compute.
+//! Metrics on real runs: values that must be zero, values that must not, and values that can be computed
+//! independently.
 
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::{Law, VARIANTS, find};
@@ -40,7 +41,7 @@ fn free_fall_keeps_everything_to_rounding() {
     for variant in &VARIANTS {
         let mut world = build(&scenes::load("free_fall").unwrap().scene, variant.name);
         let errors = observe(&mut world, 60);
-        // 60 steps of up to 4 substeps, each a few roundings of 6e-8 of what it adds to.
+        // 60 steps of up to 4 substeps, each with a few roundings of 6e-8 of the values it adds to.
         for value in [errors.momentum, errors.energy_change.abs(), errors.energy_created] {
             assert!(value < 1e-5, "{} {errors:?}", variant.name);
         }
@@ -54,7 +55,7 @@ fn the_ground_takes_the_momentum_that_weight_gives() {
         // Boxes on a slope and on each other: impulses of both kinds, at both ends.
         for name in ["incline_slip", "pyramid:6", "friction_ramp"] {
             let errors = observe(&mut build(&scenes::load(name).unwrap().scene, variant.name), 120);
-            // Rounding of velocities below 10 m/s in 120 steps; a lost impulse would be 1e-2.
+            // Rounding of velocities below 10 m/s in 120 steps. A lost impulse would be 1e-2.
             assert!(errors.momentum < 1e-4, "{name} {} {errors:?}", variant.name);
         }
     }
@@ -73,11 +74,11 @@ fn a_push_from_nowhere_shows_in_every_balance() {
         observation.observe(&world);
     }
     let errors = observation.errors();
-    // One of three boxes of 1 kg: 0.5 N·s of 3 kg × at most 0.5/√3 · √(1 + 1/6) m/s.
+    // One of three boxes of 1 kg is pushed: 0.5 N·s ÷ (3 kg × at most 0.5/√3 · √(1 + 1/6) m/s).
     assert!(errors.momentum > 0.3, "{errors:?}");
     assert!(errors.angular_momentum > 0.1, "{errors:?}");
-    // ½ 1 kg 0.25 m²/s² + ½ (1/6) 0.25 = 0.146 J, of which friction takes some in the same
-    // step; the scale is the weight of 30 N × √(1/6) m = 12.2 J and more.
+    // ½ 1 kg 0.25 m²/s² + ½ (1/6) 0.25 = 0.146 J, part of which friction removes in the same step. The scale
+    // is the weight of 30 N × √(1/6) m = 12.2 J or more.
     assert!((0.003..0.146 / 12.2).contains(&errors.energy_created), "{errors:?}");
 }
 
@@ -86,7 +87,7 @@ fn a_solver_without_friction_breaks_the_tangential_law_only() {
     let scene = scenes::load("incline_slip").unwrap().scene;
     let with = observe(&mut build(&scene, "pgs"), 60);
     let without = observe(&mut build(&scene, "projection"), 60);
-    // Friction should be µ N = 0.24 cos θ m g Δt in all, shared by two points.
+    // Friction should be µ N = 0.24 cos θ m g Δt in total, shared by two points.
     let expected = 0.24 * 0.25_f64.cos() / 2.0;
     assert!(with.law_tangent_rms < 1e-3, "{with:?}");
     assert!((without.law_tangent_rms - expected).abs() < 0.05 * expected, "{without:?}");
@@ -104,7 +105,7 @@ fn penetration_is_what_the_poses_say() {
     let errors = observe(&mut world, 1);
     let depth = 0.5 - world.bodies.position_y[1] as f64;
     assert!(depth > 0.1 && depth < 0.2, "{depth}");
-    // One point, one step: the maximum is the mean. Distances of 1 m in f32.
+    // One point, one step: the maximum equals the mean. Distances of 1 m in f32.
     for value in [errors.penetration_max, errors.penetration_mean, errors.penetration_rms] {
         assert!((value - depth).abs() < 1e-6, "{value} {depth}");
     }
@@ -120,14 +121,14 @@ fn a_lift_gives_energy_that_is_accounted_for() {
     );
     let mut world = build(&scene, "pgs");
     let errors = observe(&mut world, 120);
-    // 2 m × 10 N = 20 J came in; the scale is 0.5 J + 10 N × √(1/6) m = 4.6 J.
+    // 2 m × 10 N = 20 J were added; the scale is 0.5 J + 10 N × √(1/6) m = 4.6 J.
     assert!(world.bodies.position_y[1] > 2.4);
     assert!(errors.energy_change.abs() < 1e-3, "{errors:?}");
 }
 
 #[test]
 fn rest_velocity_is_of_the_last_second() {
-    // 2 m/s for ever; and a disc that spins with 2 rad/s: √(ω² r²/2) = 0.7071 m/s at r = 0.5.
+    // A constant 2 m/s, and a disc that spins at 2 rad/s: √(ω² r²/2) = 0.7071 m/s at r = 0.5.
     let moving =
         r#"{"type":"dynamic","position":[0,0],"velocity":[2,0],"shapes":[{"circle":{"radius":0.5}}]}"#;
     let spinning =
@@ -137,8 +138,8 @@ fn rest_velocity_is_of_the_last_second() {
     assert!((speed(spinning) - 0.5_f64.sqrt()).abs() < 1e-6);
 }
 
-/// A body that meets another within a step overlaps it before there is a contact: what is true is
-/// how low the disc was, or how near two discs, after any step.
+/// A body that hits another within a step overlaps it before there is a contact. The reference is the lowest
+/// position of the disc, or the smallest distance between two discs, after any step.
 #[test]
 fn the_deepest_overlap_is_found_where_bodies_first_meet() {
     let dropped = json(
@@ -161,12 +162,12 @@ fn the_deepest_overlap_is_found_where_bodies_first_meet() {
             }
             let found = observation.errors().penetration_max;
             assert!((found - deepest).abs() < 1e-5, "{}: {found} is not {deepest}", variant.name);
-            // Contacts begin a step later, and see what the step that met them left.
+            // Contacts begin one step later and see the overlap that the earlier step left.
             assert!(found >= known - 1e-5, "{}: {found} {known}", variant.name);
         }
     }
-    // After n steps it has fallen n (n + 1)/720 m: 4.917 m after 59, out of a contact's reach, and
-    // 5.083 m after 60. What step 61 leaves of the 83 mm is less.
+    // After n steps the disc has fallen n (n + 1)/720 m: 4.917 m after 59, out of contact range, and 5.083 m
+    // after 60. Step 61 leaves less than these 83 mm.
     let errors = observe(&mut build(&dropped, "pgs"), 120);
     assert!((errors.penetration_max - 60.0 * 61.0 / 720.0 + 5.0).abs() < 1e-4, "{errors:?}");
 }
@@ -190,7 +191,7 @@ fn overlap(world: &World) -> f64 {
                 deepest = deepest.max(radius + f64::from(other) - (ax - bx).hypot(ay - by));
                 continue;
             }
-            // The nearest point of an upright box or a level line; nobody is inside of one.
+            // The nearest point of an upright box or a level line. No center is inside one.
             let [bx, by] = world.bodies.center(world.shape_body[b] as usize);
             let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
             world.shapes[b].for_each_vertex(|v| {
@@ -220,14 +221,15 @@ fn the_residual_per_body_does_not_fall_with_their_number() {
     };
     let (one, eight) = (of(1), of(8));
     assert!(one.law_rms > 1e-3 && (one.law_rms_body / one.law_rms - 1.0).abs() < 1e-12, "{one:?}");
-    // The same box eight times: an eighth of the scene's weight, as much of its own.
+    // With eight copies, the residual is an eighth relative to the scene's weight, and unchanged relative to
+    // each body's.
     assert!((8.0 * eight.law_rms / one.law_rms - 1.0).abs() < 1e-3, "{eight:?}");
     assert!((eight.law_rms_body / one.law_rms_body - 1.0).abs() < 1e-3, "{eight:?}");
 }
 
 #[test]
 fn angles_count_whole_turns() {
-    // 180 rad/s turn by 3 rad in a step: a rotation alone could mean −3.28.
+    // At 180 rad/s a body turns by 3 rad in a step; its rotation alone could also mean −3.28.
     for spin in [50, 180] {
         let scene = scenes::load(&format!("free_spin:{spin}")).unwrap().scene;
         let mut world = build(&scene, "soft_step");
@@ -260,11 +262,11 @@ fn errors_do_not_depend_on_the_lane_width() {
 fn a_soft_contact_rests_at_its_analytic_floor() {
     let scene = scenes::load("stack:1").unwrap().scene;
     let errors = observe(&mut build(&scene, "soft_step"), 180);
-    // 1 kg and 1/6 kg·m² on two corners 0.5 m off the middle: m = 1/(1 + 6/4) kg, 5 N each,
-    // ω = 2 · 2π · 30 Hz against the ground.
+    // 1 kg and 1/6 kg·m² on two corners 0.5 m off center: m = 1/(1 + 6/4) kg, 5 N each, ω = 2 · 2π · 30 Hz
+    // against the ground.
     let omega = 120.0 * std::f64::consts::PI;
     let floor = 5.0 / (0.4 * omega * omega);
-    // The last bits of a height of 0.5 m are 3e-8 m, and a soft box hardly moves: 1 µm.
+    // The last bits of a height of 0.5 m are 3e-8 m, and a soft box hardly moves, so the tolerance is 1 µm.
     assert!((errors.soft_floor.unwrap() - floor).abs() < 0.01 * floor, "{errors:?}");
     assert!((errors.penetration_max - floor).abs() < 1e-6, "{errors:?}");
     assert!(errors.penetration_excess.unwrap() < 1e-6, "{errors:?}");
@@ -279,17 +281,17 @@ fn a_solver_can_obey_its_own_law_and_break_the_rigid_one() {
         -10.0,
     );
     let errors = observe(&mut build(&scene, "pgs"), 1);
-    // The bias wants 0.3 · (0.1 − 0.005) m · 60/s = 1.71 m/s, and the disc gets it. The rigid
-    // law wants it to stand: in m · 10 m/s² / 60, weight × step, 10.26 are too many.
+    // The bias requests 0.3 · (0.1 − 0.005) m · 60/s = 1.71 m/s, and the disc reaches it. Under the rigid law
+    // it should stand still: relative to m · 10 m/s² / 60, weight × step, the impulse is 10.26 too large.
     assert!((errors.law_normal_max - 10.26).abs() < 0.01, "{errors:?}");
-    // One row that is solved exactly: rounding.
+    // One row, solved exactly: only rounding is left.
     assert!(errors.own_max.unwrap() < 1e-5, "{errors:?}");
 
-    // Warm starts in one sweep leave a stack unsolved.
+    // A single sweep leaves a stack unsolved, even with warm starting.
     let mut world = build(&scenes::load("stack:10").unwrap().scene, "pgs");
     world.settings.budget.velocity_iterations = 1;
     assert!(observe(&mut world, 5).own_rms.unwrap() > 1e-3);
-    // Not requested, and after bounces: none.
+    // `None` if not requested, and after bounces.
     world.settings.observe_rule = false;
     assert_eq!(observe(&mut world, 5).own_rms, None);
     assert_eq!(observe(&mut build(&scenes::load("bounce").unwrap().scene, "pgs"), 90).own_rms, None);
@@ -308,11 +310,11 @@ fn friction_takes_the_energy_of_a_slide() {
     world.settings.budget.velocity_iterations = 100;
     let errors = observe(&mut world, 120);
     let scale = 0.5 + 10.0 / 6.0_f64.sqrt();
-    // The box tips by what 100 sweeps leave: per mille of its energy.
+    // The residual of 100 sweeps tips the box: per mille of its energy.
     assert!((errors.friction_loss - 0.5 / scale).abs() < 1e-3, "{errors:?}");
     assert!((errors.energy_change + 0.5 / scale).abs() < 1e-3, "{errors:?}");
     assert!(errors.impact_loss.abs() < 1e-3 && errors.energy_unexplained < 1e-5, "{errors:?}");
-    // It stopped for good after 0.2 s, to a step or two.
+    // It stopped for good after 0.2 s, plus or minus a step or two.
     assert!((errors.settled.unwrap() - 0.2).abs() < 0.04, "{errors:?}");
     assert!(errors.creep < 1e-4, "{errors:?}");
 }
@@ -321,11 +323,11 @@ fn friction_takes_the_energy_of_a_slide() {
 fn a_box_without_friction_creeps_down_a_slope() {
     let mut world = build(&scenes::load("incline_slip").unwrap().scene, "projection");
     let errors = observe(&mut world, 60);
-    // x_n = a h² n (n + 1)/2 with a = g sin 0.25 rad; a fit to n² + n over n = 1 … 60 has the
-    // slope 2 · 30.5 + 1, so x has a h/2 · 62. Rounding of positions below 1.3 m.
+    // x_n = a h² n (n + 1)/2 with a = g sin 0.25 rad. A fit to n² + n over n = 1 … 60 has the slope
+    // 2 · 30.5 + 1, so x has a h/2 · 62. The tolerance covers the rounding of positions below 1.3 m.
     let expected = 10.0 * 0.25_f64.sin() * 31.0 / 60.0;
     assert!((errors.creep - expected).abs() < 1e-5, "{expected} {errors:?}");
-    // A parabola is no line: its slope is uncertain.
+    // A parabola is not a line, so its slope is uncertain.
     assert!(errors.creep_half_width > 0.01, "{errors:?}");
     assert_eq!(errors.settled, None);
 }
@@ -341,14 +343,14 @@ fn speed_from_nowhere_is_a_blow_up() {
         world.step().unwrap();
         observation.observe(&world);
         let seen = observation.blown_up().map(|d| (d.step, d.body));
-        // It throws the box above it, and one of the two is the fastest.
+        // It throws the box above it. One of the two is the fastest.
         assert_eq!(seen.is_some(), step >= 5, "{seen:?}");
         assert!(seen.is_none_or(|(at, body)| at == 5 && body >= 2), "{seen:?}");
     }
 }
 
-/// Near 10⁸ m from its center of mass the box has no width left in 32 bits. Overlap was told in
-/// half widths of the thinnest shape, and so was infinite.
+/// Near 10⁸ m from its center of mass, the box has no width left in 32 bits. Overlap relative to half the
+/// width of the thinnest shape would be infinite.
 #[test]
 fn a_shape_without_width_has_finite_errors() {
     let scene = json(

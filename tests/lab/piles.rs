@@ -1,4 +1,4 @@
-//! Piles under the default solver: what contacts bear in statics, and what springs are shortened by.
+//! Piles under the default solver: loads of contacts from statics, and the shortening of springs.
 
 use super::common;
 use simpulse::engine::solvers;
@@ -12,14 +12,14 @@ fn scene(name: &str) -> World {
     common::scene(name).build(common::settings(solvers::find("shim").unwrap())).unwrap()
 }
 
-/// These bodies, each after a comma, on the ground.
+/// These bodies, each preceded by a comma, on the ground.
 fn on_ground(bodies: &str) -> Scene {
     let ground = r#"{"type":"static","position":[0,-1],"shapes":[{"box":{"half":[60,1]}}]}"#;
     Scene::from_json(&format!(r#"{{"name":"piles","bodies":[{ground}{bodies}]}}"#), "piles.json".as_ref())
         .unwrap()
 }
 
-/// Ten tables on top of each other stand on two legs each: they rest within ten seconds.
+/// Ten tables on top of each other, each on two legs, come to rest within ten seconds.
 #[test]
 fn tables_on_tables_rest() {
     let table = |i: u32| {
@@ -39,7 +39,7 @@ fn tables_on_tables_rest() {
     assert!(fastest < 1e-3, "{fastest}");
 }
 
-/// Bodies of a scene, moved along x, and pushed a little so that something happens.
+/// Bodies of a scene, moved along x.
 fn moved(name: &str, by: f64) -> Vec<SceneBody> {
     let mut bodies = common::scene(name).bodies;
     for body in &mut bodies {
@@ -48,8 +48,8 @@ fn moved(name: &str, by: f64) -> Vec<SceneBody> {
     bodies
 }
 
-/// What a step does to a pile does not depend on another one in the same world: places agree to what other colors, and so another
-/// order of its contacts, leave in a second.
+/// A step's effect on a pile does not depend on another pile in the same world. Positions agree up to what
+/// other colors, and so another order of contacts, cause within a second.
 #[test]
 fn a_pile_knows_nothing_of_another() {
     let settings = || common::settings(solvers::find("shim").unwrap());
@@ -78,8 +78,8 @@ fn a_pile_knows_nothing_of_another() {
     }
 }
 
-/// A stack that begins at rest stays there from its first step on. Springs are shortened by all of their sag, so only
-/// rounding is left: each contact below a body at p rounds its separation to ε |p|.
+/// A stack that starts at rest stays there from its first step on. Springs are shortened by all of their sag,
+/// so only rounding is left: each contact below a body at p rounds its separation to ε |p|.
 #[test]
 fn statics_leaves_a_stack_where_it_is() {
     for name in ["stack:20", "pyramid:10", "disc_column:10"] {
@@ -90,7 +90,7 @@ fn statics_leaves_a_stack_where_it_is() {
             for body in 0..world.bodies.len() {
                 let moved = (world.bodies.pose(body).position - before.pose(body).position).length();
                 let place = before.pose(body).position;
-                // Bodies are a meter high.
+                // Bodies are one meter high.
                 let levels = place.y.max(0.0).ceil();
                 let rounding = f32::EPSILON * place.length().max(1.0);
                 assert!(moved <= rounding * levels, "{name}: body {body} {moved} m, {levels} contacts below");
@@ -99,8 +99,8 @@ fn statics_leaves_a_stack_where_it_is() {
     }
 }
 
-/// An arch stands on thrust, and begins with it: its crown sinks by 2 mm, and not by 12
-/// as under loads that know no thrust.
+/// An arch stands by thrust. If it starts with that thrust, its crown sinks by 2 mm; under loads that ignore
+/// thrust, by 12.
 #[test]
 #[ignore = "known not to hold: thrust is found by sweeps, and stones settle by 6 mm in the first steps"]
 fn an_arch_begins_with_its_thrust() {
@@ -115,7 +115,7 @@ fn an_arch_begins_with_its_thrust() {
     }
 }
 
-/// Unit boxes under one of many times their mass, for a minute: 20 µm at each contact.
+/// Unit boxes under a box of many times their mass, for a minute: 20 µm of sinking per contact.
 #[test]
 fn columns_bear_boxes_of_a_hundred_and_nine_hundred_times_the_mass() {
     for (count, density) in [(10, 100.0), (20, 900.0)] {
@@ -140,7 +140,7 @@ fn columns_bear_boxes_of_a_hundred_and_nine_hundred_times_the_mass() {
     }
 }
 
-/// Springs begin shortened by all of their sag, so that piles do not fall into it.
+/// Springs start shortened by all of their sag, so that piles do not sink into it.
 #[test]
 fn piles_that_begin_at_rest_create_no_energy() {
     for name in ["stack:20", "pyramid:20", "disc_column:30", "mass_ratio:1000"] {
@@ -157,7 +157,8 @@ fn piles_that_begin_at_rest_create_no_energy() {
     }
 }
 
-/// Cards begin up to 2 mm in each other. Pushed apart at once, they lose the top of the house at many lengths of a step.
+/// Cards start up to 2 mm inside each other. If they were pushed apart at once, the house would lose its top
+/// at many step lengths.
 #[test]
 fn a_house_of_cards_that_begins_in_itself_stands_at_any_step() {
     for rate in [30, 40, 60, 90, 120, 240, 480] {
@@ -176,9 +177,9 @@ fn a_house_of_cards_that_begins_in_itself_stands_at_any_step() {
     }
 }
 
-/// Boxes of 100, 200 and 300 times the mass of a brick arrive at 6.3 m/s. Their impact reaches the ground in the step in
-/// which it happens, or bricks are thrown out of the pile. Where the boxes hit decides how far single bricks move: 0.06 m in the
-/// middle of 48 drops side by side, and at most 0.13 m.
+/// Boxes of 100, 200 and 300 times the mass of a brick arrive at 6.3 m/s. Their impact must reach the ground
+/// in the step in which it happens, or bricks are thrown out of the pile. How far single bricks move depends
+/// on where the boxes hit: typically 0.06 m over 48 drops side by side, and at most 0.13 m.
 #[test]
 fn pyramids_stand_under_heavy_boxes_that_are_dropped_on_them() {
     for aside in -4..=4 {
@@ -197,8 +198,9 @@ fn pyramids_stand_under_heavy_boxes_that_are_dropped_on_them() {
     }
 }
 
-/// Random scenes side by side: the first of a world moves as it does alone, to the bit, whatever the other one a kilometer
-/// away is. Scenes with steps, gravity or substeps of their own cannot share a world, and are left out.
+/// Random scenes side by side. The first scene of a world moves to the same bits as alone, whatever the other
+/// scene is, one kilometer away. Scenes with their own step, gravity or substeps cannot share a world and are
+/// skipped.
 #[test]
 fn a_random_scene_moves_as_it_does_alone_beside_another() {
     const SCENES: u32 = 30;
@@ -238,8 +240,9 @@ fn a_random_scene_moves_as_it_does_alone_beside_another() {
     }
 }
 
-/// Impacts before the step have a bound: an island solves no more than 18 times each of its first eight points and the others once,
-/// one more wave, and the points of one body. So steps of random scenes with restitution and without do.
+/// Impacts before the step are bounded. An island may visit points 18 times for each of its first eight
+/// points and once for each of the others, plus one more wave and the points of one body. Steps of random
+/// scenes, with restitution and without, stay within this bound.
 #[test]
 fn impacts_of_a_step_stay_within_their_bound() {
     let (mut most, mut cut) = (0, 0);
@@ -263,8 +266,9 @@ fn impacts_of_a_step_stay_within_their_bound() {
     assert!(most > 256 && cut > 0, "no scene needs a bound: {most} visits, {cut} islands cut off");
 }
 
-/// No body hands down more load than it bears, however a wall is compressed that something has hit. (Where each point gets up to
-/// twice the force on its body instead, walls of more courses blow up; without any limit a third of these do.)
+/// No body passes down more load than it carries, however a hit compresses the wall. (With a limit per point
+/// instead, twice the force on its body, walls of more courses blow up; without any limit, a third of these
+/// do.)
 #[test]
 fn walls_that_are_hit_make_no_energy() {
     let struck = family("struck").unwrap();
@@ -275,8 +279,8 @@ fn walls_that_are_hit_make_no_energy() {
     }
 }
 
-/// Restitution goes to zero continuously: what would leave slower than a tenth of what gravity adds in a step stops, so ten
-/// boxes that fall on each other move at e = 10⁻⁶ as they do at e = 0.
+/// Restitution goes to zero continuously: rebounds slower than a tenth of what gravity adds in a step are
+/// stopped. So ten boxes that fall on each other move at e = 10⁻⁶ as at e = 0.
 #[test]
 fn a_little_restitution_is_none() {
     let fallen = |e: f64| {

@@ -1,4 +1,4 @@
-//! Laws of impacts without restitution, under the solver that stops them before the step.
+//! Laws of impacts without restitution, under the solver that resolves them before the step.
 
 use super::common::totals;
 use proptest::prelude::*;
@@ -27,7 +27,7 @@ fn pair(
 }
 
 proptest! {
-    /// Two free boxes that hit each other anywhere keep both momenta and make no energy.
+    /// Two free boxes that hit each other anywhere conserve both momenta and gain no energy.
     #[test]
     fn momenta_are_kept_and_no_energy_is_made(
         angles in [-1.5f64..1.5, -1.5..1.5],
@@ -46,12 +46,13 @@ proptest! {
         let after = totals(&world);
         let scale = before[0].hypot(before[1]).max(1.0);
         for k in 0..2 {
-            // 60 · 14 substeps round each velocity four times, by 2⁻²⁴ of it: √3360 · 6e-8 = 3.5e-6, and six times that.
+            // 60 · 14 substeps round each velocity four times, by 2⁻²⁴ of it: √3360 · 6e-8 = 3.5e-6. The
+            // bound is six times that.
             prop_assert!((after[k] - before[k]).abs() < 2.1e-5 * scale, "{before:?} {after:?}");
         }
-        // A gap that closes within a step without having been foreseen leaves an overlap. Springs that push it out in the next
-        // step, with an impulse of μ v_n at most, act on both bodies at points that were one when that step began, and are
-        // v_t h apart at its end: μ v_n v_t h is gained at most.
+        // A gap that closes unpredicted within a step leaves an overlap. In the next step, springs push it
+        // out with an impulse of at most μ v_n. They act on the two bodies at points that coincide at the
+        // start of that step and are v_t h apart at its end. So at most μ v_n v_t h is gained.
         let reduced = 1.6 * density / (1.6 + density);
         let passing = speed[0].hypot(speed[1]) + 0.95 * spins[0].abs() + 0.75 * spins[1].abs();
         let gained = reduced * passing * passing / 60.0;
@@ -83,7 +84,7 @@ fn impacts_of_a_crowd_have_the_same_bits_at_every_width() {
 
 #[test]
 fn a_body_that_lands_lies_on_the_ground_and_not_where_the_step_found_it() {
-    // 4 m/s, from heights that leave parts of a step.
+    // 4 m/s, from heights that are not whole numbers of steps.
     for height in [0.005, 0.012, 0.03, 0.05] {
         let ground = SceneBody::fixed([0.0, 0.0], SceneShape::line(5.0));
         let falling = SceneBody::dynamic([0.0, 0.5 + height], SceneShape::disc(0.5)).moving([0.0, -4.0], 0.0);
@@ -94,8 +95,9 @@ fn a_body_that_lands_lies_on_the_ground_and_not_where_the_step_found_it() {
     }
 }
 
-/// A body that is thrown half through a line has one shape above it and one below, and slides to the line's end: contacts
-/// that push against each other hold nothing that could shoot it off there, with many times the energy it has.
+/// A body thrown halfway through a line has one shape above it and one below, and slides to the end of the
+/// line. Contacts that push against each other must not store anything that shoots the body off there with
+/// many times its energy.
 #[test]
 fn a_body_that_is_caught_in_a_line_makes_no_energy_where_the_line_ends() {
     let text = r#"{"name":"caught","dt":0.03333333333333333,"bodies":[
@@ -111,7 +113,7 @@ fn a_body_that_is_caught_in_a_line_makes_no_energy_where_the_line_ends() {
         0.5 * (f64::from(b.velocity(1).length_squared()) + turning) + 10.0 * y
     };
     let run = |substeps: u32, without: Without| {
-        // Else it would not get into the line.
+        // Otherwise it would not get into the line.
         let mut settings =
             Settings { without, continuous: false, ..crate::common::settings(find(DEFAULT).unwrap()) };
         settings.budget.substeps = substeps;

@@ -1,4 +1,4 @@
-//! Profiling: what is counted is what the kernels do, and the world does not notice.
+//! Profiling: counts match the work of the kernels, and the world is not affected.
 
 use crate::common::{scene, settings, with_width};
 use simpulse::engine::clock::Phase;
@@ -19,7 +19,7 @@ fn probe(frozen: &mut HeldWorld, phase: Phase) -> Probe {
     *frozen.probes().iter().find(|p| p.phase == phase).unwrap()
 }
 
-/// So many times all of these.
+/// Sum of these counts, multiplied by `times`.
 fn sum(all: &[Operations], times: u64) -> Operations {
     let of = |count: fn(&Operations) -> u64| times * all.iter().map(count).sum::<u64>();
     Operations {
@@ -31,25 +31,25 @@ fn sum(all: &[Operations], times: u64) -> Operations {
     }
 }
 
-/// One box on static ground, and one box on another that is on the ground: per contact the counts of
-/// the text of the kernel, made by hand for two points with friction.
+/// One box on static ground, and one box on another on the ground. Operations per contact are counted by hand
+/// in the kernel source, for two points with friction.
 #[test]
 fn operations_are_those_counted_by_hand() {
     // On static ground, body a has no part.
     //
-    // warm start, per point and axis: an addition to the sum, and I r × u (a multiplication) applied
-    // by a multiply-add. Then the sums are turned back (2 multiplications, 2 multiply-adds) and
-    // applied to x and y of b (2 multiply-adds).
+    // warm start, per point and axis: an addition to the sum, and I r × u (a multiplication) applied by a
+    // multiply-add. Then the sums are rotated back (2 multiplications, 2 multiply-adds) and applied to x and
+    // y of b (2 multiply-adds).
     let warm_static =
         Operations { adds: 4, multiplies: 4 + 2, multiply_adds: 4 + 4, ..Operations::default() };
     // soft sweep:
     //   velocities and motions into the frame        4 multiplications, 4 multiply-adds
     //   sine and versine of both turns               6 multiplications, 4 multiply-adds
     //   per point: separation 1 addition, 2 multiply-adds; the rule's line 4 multiplications,
-    //     1 multiply-add, 4 choices; vn, vt and the impulses that they ask for 4 multiply-adds
+    //     1 multiply-add, 4 choices; vn, vt and the resulting impulses 4 multiply-adds
     //   normal rows: clamp 1 choice, increment and sum 2 additions each
     //   friction rows: bound 1 multiplication, clamp 2 choices, increment and sum 2 additions each
-    //   the answer of a later row to an increment: I r × u times the other arm, times the slope,
+    //   response of a later row to an increment: I r × u times the other arm, times the slope,
     //     2 multiplications, 2 multiply-adds; normal to normal 1, normal to friction 4, friction to
     //     friction 1
     //   the spin of b after each of 4 increments     4 multiplications, 4 multiply-adds
@@ -62,9 +62,9 @@ fn operations_are_those_counted_by_hand() {
         divisions: 0,
         choices: 2 * (4 + 1 + 2),
     };
-    // Against a dynamic body: differences of velocities and motions (4 additions), the sum of the
-    // masses (1); one more multiply-add for each use of an arm (4 per point); in each answer and for
-    // each spin one more of both; and 2 multiply-adds to apply.
+    // Against a dynamic body: differences of velocities and motions (4 additions), and the sum of the masses
+    // (1). One more multiply-add for each use of an arm (4 per point). One more multiplication and
+    // multiply-add for each response and each spin. 2 multiply-adds to apply.
     let soft_dynamic = Operations {
         adds: soft_static.adds + 5,
         multiplies: soft_static.multiplies + answers + 4,
@@ -91,16 +91,18 @@ fn operations_are_those_counted_by_hand() {
     }
 }
 
-/// A chain of 21 hinges, by the text of `constraints/joints/rows.rs`.
+/// A chain of 21 hinges, counted in the source of `constraints/joints/rows.rs`.
 #[test]
 fn operations_of_joints_are_those_counted_by_hand() {
-    // Sine and versine of both turns: 6 multiplications, 4 multiply-adds. Both anchors turned, 4 and 4; the arms and the way
-    // between them, 12 additions. Each row applied: 4 multiplications, 6 multiply-adds.
+    // Sine and versine of both turns: 6 multiplications, 4 multiply-adds. Rotation of both anchors: 4 and 4.
+    // The arms and the offset between the anchors: 12 additions. Each row applied: 4 multiplications, 6
+    // multiply-adds.
     let placed = Operations { adds: 12, multiplies: 6 + 4, multiply_adds: 4 + 4, ..Operations::default() };
     let warm = Operations { multiplies: 10 + 2 * 4, multiply_adds: 8 + 2 * 6, ..placed };
-    // Per row J v, 2 additions, 1 multiplication, 3 multiply-adds; what it asks for, 1 of each; the new impulse, 2 additions with
-    // its increment, 2 multiply-adds; applied as above. K: an addition, and in each of 3 entries 4 multiplications and 3
-    // multiply-adds. By its determinant, which may be zero: 5 and 3, a division and a choice.
+    // Per row: J v, 2 additions, 1 multiplication, 3 multiply-adds; the requested impulse, 1 of each; the new
+    // impulse, 2 additions with its increment, 2 multiply-adds; applied as above. K: an addition, and for
+    // each of 3 entries 4 multiplications and 3 multiply-adds. Solving by its determinant, which may be zero:
+    // 5 and 3, a division and a choice.
     let sweep = Operations {
         adds: 12 + 2 * (2 + 1 + 2) + 1,
         multiplies: 10 + 2 * (1 + 1 + 4) + 3 * 4 + 5,
@@ -129,8 +131,8 @@ fn bytes_are_those_of_the_layout() {
             .map(|kind| Layout::for_features(&features, kind).bytes(kind) as f64);
         let solve = probe(&mut frozen, Phase::Solve);
         let found = traffic::of(&frozen, &solve);
-        // A whole record and its indices, one row or two; four impulses and one half row or two. A
-        // batch has all its lanes, filled or not.
+        // Reads: a whole record and its indices, one row or two. Writes: four impulses, and one half row or
+        // two. A batch has all its lanes, filled or not.
         assert_eq!(found.read, lanes * (on_ground + 32.0 + on_box + 64.0));
         assert_eq!(found.written, lanes * (16.0 + 16.0 + 16.0 + 32.0));
         // Records and indices once, three bodies and the inert row.
@@ -145,8 +147,7 @@ fn bytes_are_those_of_the_layout() {
     }
 }
 
-/// Nothing that a solver does is free: every phase asks for bytes, and every pass over contacts counts
-/// its operations.
+/// Every phase of a solver requests bytes, and every pass over contacts counts its operations.
 #[test]
 fn every_pass_of_every_solver_has_its_traffic() {
     for solver in &VARIANTS {
@@ -168,8 +169,8 @@ fn every_pass_of_every_solver_has_its_traffic() {
     }
 }
 
-/// By hand: a Jacobi sweep gathers the sums of the bodies beside their velocities, a position sweep
-/// reads no impulse, a block sweep is as wide as a plain one.
+/// Counted by hand: a Jacobi sweep gathers the bodies' sums in addition to their velocities, a position sweep
+/// reads no impulses, and a block sweep is as wide as a plain one.
 #[test]
 fn passes_that_are_not_plain_sweeps_ask_for_what_they_read() {
     let per_contact = |solver: &str, phase: Phase| {
@@ -188,8 +189,8 @@ fn passes_that_are_not_plain_sweeps_ask_for_what_they_read() {
     assert_eq!((dynamic, ground), ([2.0 + 8.0 + 4.0, 0.0, 2.0, 2.0], [2.0 + 4.0 + 4.0, 0.0, 1.0, 1.0]));
 }
 
-/// Solvers, scenes and orders: every phase alone, counted, reset, then a whole step; the steps
-/// after that have the bits that they would have had.
+/// For several solvers, scenes and orders: every phase alone, counted and reset, then a whole step. The steps
+/// after that must have the same bits as without profiling.
 #[test]
 fn the_next_step_does_not_notice() {
     let scenes = [("pyramid:6", 30), ("circle_pile:60", 40), ("bounce", 100), ("crowded_plate", 4)];
@@ -209,14 +210,14 @@ fn the_next_step_does_not_notice() {
                     frozen.reset(probe.phase);
                     frozen.repeat(probe.phase, 1);
                 }
-                // Whole steps leave what phases can go on from.
+                // Whole steps leave a state from which phases can continue.
                 frozen.step(false);
                 frozen.step(true);
                 frozen.repeat(Phase::Collide, 2);
                 frozen.repeat(Phase::Store, 2);
                 drop(frozen);
                 for step in 0..5 {
-                    // A run that diverges does so in both.
+                    // A run that diverges does so in both worlds.
                     assert_eq!(plain.step().is_ok(), profiled.step().is_ok());
                     let place = format!("{name} {} {width:?} {order:?}, step {step}", solver.name);
                     assert_eq!(plain.state_hash(), profiled.state_hash(), "{place}");
@@ -272,7 +273,7 @@ fn each_solver_has_the_phases_of_its_schedule() {
 fn memory_is_what_arrays_hold() {
     let world = settled("pyramid:10", settings(find(DEFAULT).unwrap()), 3);
     let memory = world.memory();
-    // Continuous collision is a choice of the run.
+    // Continuous collision is optional.
     let has = |c: &Component| c.used > 0 || c.name == "continuous collision";
     assert!(memory.components.iter().all(|c| c.used <= c.held && has(c)), "{memory:?}");
     let contact = size_of::<Contact>();
@@ -356,7 +357,7 @@ fn a_profile_prints_every_phase_and_draws_a_whole_picture() {
     let output = simpulse(folder.path(), &args);
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(text.contains("warm start:") && !text.contains("DRAM"), "{text}");
-    // A scene in which nothing touches has phases, and nothing in them.
+    // A scene without contacts has phases that do no work.
     let args = ["profile", "free_fall", "--seconds", "0.02", "--settle", "0"];
     let output = simpulse(folder.path(), &args);
     let text = String::from_utf8(output.stdout).unwrap();
@@ -384,7 +385,7 @@ fn growth_writes_a_row_per_size() {
         let text = String::from_utf8(output.stdout).unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         assert!(text.contains("whole step:") && text.contains("contacts^"), "{text}");
-        // Size 10⁷ does not exist: said, and no failure.
+        // Size 10⁷ does not exist: reported, but not a failure.
         assert_eq!(text.contains("skipped: 10000000"), scene == "stack", "{text}");
         let csv = std::fs::read_to_string(folder.path().join("g/growth.csv")).unwrap();
         assert_eq!(csv.lines().count(), 1 + rows, "{csv}");
@@ -397,8 +398,9 @@ fn growth_writes_a_row_per_size() {
     }
 }
 
-/// Each solver's file says what the sweeps of a step request at its standard budget, warm start included: bytes per
-/// contact of a pyramid of ten, contacts of two points with friction, at one lane (no padding).
+/// The file of each solver states the bytes that the sweeps of a step request at its standard budget, warm
+/// start included: bytes per contact of a pyramid of ten, for contacts of two points with friction, at one
+/// lane (no padding).
 #[test]
 fn files_of_solvers_say_how_many_bytes_a_step_requests() {
     let mut wrong = String::new();
@@ -422,7 +424,7 @@ fn files_of_solvers_say_how_many_bytes_a_step_requests() {
         let at = words.windows(3).position(|w| w == unit);
         let said = at.and_then(|at| words.get(at.wrapping_sub(1))).and_then(|word| word.parse::<f64>().ok());
         let measured = bytes / contacts;
-        // How many steps of a gradient are taken again is decided by rounding, which differs from CPU to CPU.
+        // Rounding, which differs between CPUs, decides how many gradient steps are repeated.
         if said.is_none_or(|said| (said / measured - 1.0).abs() > 0.02) {
             wrong += &format!("{}: {measured:.0} B per contact, its file says {said:?}\n", variant.name);
         }

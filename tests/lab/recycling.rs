@@ -1,4 +1,4 @@
-//! Kept manifolds: what `box2d` solves is what the narrow phase would find.
+//! Recycled manifolds: the contacts that `box2d` solves are the contacts that the narrow phase would find.
 
 use simpulse::engine::clock::Phase;
 use simpulse::engine::contacts::Contact;
@@ -23,8 +23,9 @@ fn found_again(scene: &Scene, world: &World) -> Vec<Contact> {
 
 #[test]
 fn kept_manifolds_follow_their_bodies() {
-    // A pile at rest, a box that stops sliding, and boxes that turn with a drum, where a face of b may have turned by
-    // 0.2 rad under a corner that has moved by 0.05 m with its center and by 0.2 rad about it, at 0.177 m.
+    // A pile at rest, a box that stops sliding, and boxes that turn with a drum. There, a face of b may have
+    // turned by 0.2 rad under a corner that has moved by 0.05 m with its center and by 0.2 rad about it, at
+    // 0.177 m.
     let mut differing = 0;
     for (name, steps, bound) in
         [("pyramid:8", 120, 2e-6), ("sliding_stop", 20, 2e-6), ("tumbler", 40, (0.05 + 0.2 * 0.177) * 0.2)]
@@ -90,7 +91,8 @@ fn who_looks_twice_or_holds_a_world_changes_nothing() {
     }
 }
 
-/// Mean overlap (mm) in the last six of eight seconds, found by the narrow phase whatever was kept.
+/// Mean and largest overlap (mm) in the last six of eight seconds, found by the narrow phase, ignoring kept
+/// manifolds.
 #[test]
 #[ignore = "prints what papers/peers.md quotes"]
 fn overlap_with_and_without() {

@@ -1,4 +1,4 @@
-//! The law of rest: piles of a few boxes stay where they are at the standard budget.
+//! The law of rest: piles of a few boxes stay in place at the standard budget.
 
 use crate::common::fastest;
 use simpulse::engine::clock::Phase;
@@ -16,10 +16,10 @@ use simpulse::lab::torture;
 /// Piles of a few boxes: a stack, a pyramid, and one box held by friction.
 const PILES: [&str; 3] = ["stack:10", "pyramid:4", "incline_stick"];
 
-/// How far bodies may creep in the last five of ten seconds (m): a fifth of a slop.
+/// Allowed creep of bodies in the last five of ten seconds (m): a fifth of the slop.
 const CREEP: f64 = 1e-3;
 
-/// The greatest way of any body in the last five of ten seconds (m).
+/// Largest displacement of any body in the last five of ten seconds (m).
 fn creep(pile: &str, variant: &'static Variant) -> f64 {
     let scene = crate::common::scene(pile);
     let mut world = crate::common::run(&scene, crate::common::settings(variant), 300);
@@ -51,13 +51,13 @@ fn piles_of_a_few_boxes_stay_where_they_are() {
 
 #[test]
 fn not_every_solver_keeps_them() {
-    // Else the bound would hold nobody to anything.
+    // Otherwise the bound would exclude nothing.
     let variant = VARIANTS.iter().find(|v| v.name == "projection").unwrap();
     assert!(!variant.promises(Law::Rest) && creep("stack:10", variant) > CREEP);
 }
 
-/// Forty frictionless discs in a row along the ground, which a tenth of their weight presses against a wall: as long a
-/// chain as a column of forty, and no load that tells it.
+/// Forty frictionless discs in a row on the ground, pressed against a wall by a tenth of their weight. The
+/// chain is as long as a column of forty, but no load reveals that.
 #[test]
 fn a_pressed_row_does_not_swing_on_its_preload() {
     let fixed = |position: [f64; 2], half: [f64; 2]| {
@@ -92,8 +92,8 @@ fn median_speed(seed: u64, without: Without) -> f64 {
     squares[squares.len() / 2].sqrt()
 }
 
-/// Single discs roll on for long, as they should. The pile around them does not swell and settle on what its springs
-/// are shortened by.
+/// Single discs keep rolling for long, as they should. The pile around them does not swell and settle with
+/// the shortening of its springs.
 #[test]
 fn a_pile_of_discs_hardly_breathes() {
     let held = median_speed(1, Without::default());
@@ -111,7 +111,7 @@ fn a_pile_of_discs_is_at_rest() {
     assert!(speeds[2] < 1e-4, "{speeds:?} m/s");
 }
 
-/// Lemke's method and Newton's end in the same state of the contact law, far closer to it than sweeps do.
+/// Lemke's and Newton's methods reach the same solution of the contact law, far more exactly than sweeps do.
 #[test]
 fn lemke_and_newton_agree_on_a_stack() {
     let direct = find("direct").unwrap();
@@ -128,8 +128,8 @@ fn lemke_and_newton_agree_on_a_stack() {
     }
 }
 
-/// Root mean square of √(2 E_kin/M) over the third second of a scene (mm/s), with `after` called after each step;
-/// each substep of the standard budget is `parts` steps of one substep if there are any.
+/// Root mean square of √(2 E_kin/M) over the third second of a scene (mm/s). `after` is called after each
+/// step. With `parts`, each substep of the standard budget becomes `parts` steps of one substep.
 fn residual_speed(scene: &Scene, solver: &str, parts: Option<u32>, after: impl Fn(&mut World)) -> f64 {
     residual_speed_of(scene, find(solver).unwrap(), parts, after)
 }
@@ -164,7 +164,7 @@ fn residual_speed_of(
     1e3 * squares.sqrt()
 }
 
-/// Springs that see separations rounded as points of the world are 200 m away from the origin.
+/// Springs that see separations rounded as at a distance of 200 m from the origin.
 #[derive(Clone, Copy, Debug)]
 struct Grainy<R>(R);
 
@@ -177,7 +177,7 @@ impl<R: NormalRule> NormalRule for Grainy<R> {
     }
 }
 
-/// `rapier` with such springs.
+/// `rapier` with these springs.
 static GRAINY: Variant = Variant { name: "grainy", make: || Schedule::boxed(grainy_step), ..rapier::SOLVER };
 
 fn grainy_step(passes: &mut Passes<'_>) {
@@ -218,14 +218,14 @@ fn speeds_at_rest_with_rounded_separations() {
     println!("separations in f32: {figures:.5?} mm/s");
 }
 
-/// Forgets what positions have beyond `f32`, as engines that keep positions in one `f32` do.
+/// Discards the low part of positions, as in engines that keep positions in one `f32`.
 fn round_positions(world: &mut World) {
     world.bodies.position_x_lo.fill(0.0);
     world.bodies.position_y_lo.fill(0.0);
 }
 
-/// What is left of speed at rest is what positions are rounded to: with one `f32` each it grows with the distance from the
-/// origin, as in engines that keep them so.
+/// Residual speed at rest comes from the rounding of positions. With one `f32` per coordinate it grows with
+/// the distance from the origin, as in engines that store positions this way.
 #[test]
 fn speeds_at_rest_grow_with_what_positions_are_rounded_to() {
     let speeds = ["many_pyramids:5", "many_pyramids:10"].map(|name| {
@@ -237,7 +237,7 @@ fn speeds_at_rest_grow_with_what_positions_are_rounded_to() {
     });
     let [[low, low_rounded], [high, high_rounded]] = speeds;
     assert!(low_rounded > 20.0 * low && high_rounded > 20.0 * high, "{speeds:?}");
-    // Twice as high; places of floats double their spacing at powers of two.
+    // Twice as high. Float spacing doubles at powers of two.
     assert!((1.5..3.0).contains(&(high_rounded / low_rounded)) && high < 1.5 * low, "{speeds:?}");
 }
 
@@ -259,8 +259,9 @@ fn speeds_at_rest_with_positions_in_f32() {
     }
 }
 
-/// A box that rolls on the round end of a capsule, as `shim` has left it after nine seconds, under other solvers: the fastest body of
-/// one second, right away and ten seconds later. What rolls without slipping is not worked on by its contact.
+/// A box that rolls on the round end of a capsule, as `shim` leaves it after nine seconds, continued under
+/// other solvers. Prints the fastest body of one second, right away and ten seconds later. A contact does no
+/// work on a body that rolls without slipping.
 #[test]
 #[ignore = "prints figures of papers/peers.md"]
 fn what_rolls_keeps_its_speed_with_more_substeps() {
@@ -293,20 +294,21 @@ fn what_rolls_keeps_its_speed_with_more_substeps() {
     }
 }
 
-/// Boxes of 100 to 300 times the mass that have fallen on pyramids rock at first. What preload would do to them by following
-/// their loads to and fro keeps them rocking for minutes, at some centimeters per second.
+/// Boxes of 100 to 300 times the mass, dropped on pyramids, rock at first. Preload that followed their loads
+/// back and forth would keep them rocking for minutes, at a few centimeters per second.
 #[test]
 #[ignore = "known not to hold: they rock at up to 0.2 m/s, see papers/shim.md"]
 fn heavy_boxes_on_pyramids_come_to_rest() {
     let scene = crate::common::scene("high_mass_ratio_1");
     let world = crate::common::run(&scene, crate::common::settings(find("shim").unwrap()), 1500);
     let fastest = fastest(&world);
-    // Where speed is an average over a second and over mass, the target is 1e-3: this is the fastest body of one step.
+    // The target of 1e-3 is for speeds averaged over a second and over mass. This is the fastest body of a
+    // single step.
     assert!(fastest < 5e-3, "{fastest} m/s");
 }
 
-/// Limbs that fall into each other at 9 m/s end up crossed, held by joints and pushed apart by contacts: an equilibrium that
-/// impacts, jams and loads of statics must leave alone.
+/// Limbs that fall into each other at 9 m/s end up crossed, held by joints and pushed apart by contacts.
+/// Impacts, jams and static loads must leave this equilibrium alone.
 #[test]
 fn most_piles_of_ragdolls_come_to_rest() {
     let moves = |humans: u32| {

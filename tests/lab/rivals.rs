@@ -1,18 +1,19 @@
-//! Law: rivals are as good as their sources.
+//! Law: rival solvers are as good as their sources.
 
 use crate::common::fastest;
 use simpulse::engine::solvers::find;
 use simpulse::engine::world::World;
 
-/// A scene under a solver at its standard budget, with so many substeps if any.
+/// A scene under a solver at its standard budget, with `substeps` substeps if given.
 fn run(scene: &str, solver: &str, substeps: Option<u32>, steps: u32) -> World {
     let mut settings = crate::common::settings(find(solver).unwrap());
     settings.budget.substeps = substeps.unwrap_or(settings.budget.substeps);
     crate::common::run(&crate::common::scene(scene), settings, steps)
 }
 
-/// A box slides down an incline of 0.25 rad with µ = 0.24: 297 mm in two seconds. Solver2D slides 13.8 % too far with 4
-/// substeps and 2.8 % with 20: all normals of a contact come before its frictions. Point by point it is 91 % and 89 %.
+/// A box slides down an incline of 0.25 rad with µ = 0.24: 297 mm in two seconds. Solver2D slides 13.8 % too
+/// far with 4 substeps and 2.8 % with 20, because it solves all normals of a contact before its frictions.
+/// Solving point by point gives 91 % and 89 %.
 #[test]
 fn xpbd_slides_as_its_source_does_and_converges_with_substeps() {
     let excess = |substeps: u32| {
@@ -31,10 +32,12 @@ fn xpbd_slides_as_its_source_does_and_converges_with_substeps() {
     assert!(many < 1.0, "{many} %");
 }
 
-/// The demonstration's start places, margin and whole multipliers bring piles to rest; sticking holds them at a place.
+/// The demonstration's start positions, margin and whole multipliers bring piles to rest. Sticking holds them
+/// in place.
 ///
-/// Velocities are differences of positions over a step of 1/60 s. Coordinates of the pyramid are below 4 m, where
-/// neighbours of single precision are 2⁻²² m apart: one of them, along both axes, is √2 · 2⁻²² · 60 = 2.0e-5 m/s.
+/// Velocities are differences of positions over a step of 1/60 s. Coordinates of the pyramid are below 4 m,
+/// where adjacent single-precision numbers are 2⁻²² m apart. One such step along both axes is
+/// √2 · 2⁻²² · 60 = 2.0e-5 m/s.
 #[test]
 fn avbd_comes_to_rest() {
     let rounding = 2.0f32.sqrt() * 2.0f32.powi(-22) * 60.0;
@@ -44,7 +47,7 @@ fn avbd_comes_to_rest() {
     }
 }
 
-/// Rigid sweeps in substeps hold a stack higher than as many sweeps in one step.
+/// Rigid sweeps spread over substeps hold a stack higher than the same number of sweeps in one step.
 #[test]
 fn substeps_hold_higher_than_sweeps() {
     let top = |solver: &str, sweeps: u32| {

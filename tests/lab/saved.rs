@@ -1,4 +1,4 @@
-//! A world that was saved and read again goes on as if nothing had happened.
+//! A saved and reloaded world continues as if nothing had happened.
 
 use simpulse::engine::solvers::{VARIANTS, find};
 use simpulse::engine::world::World;
@@ -7,8 +7,9 @@ fn again(world: &World) -> World {
     serde_json::from_str(&serde_json::to_string(world).unwrap()).unwrap()
 }
 
-/// Solvers that keep something in fields of their own, which is not saved: `shim` the graph of its piles and the state of
-/// its impacts, `box2d` the manifolds that it reuses, `random_order` the state of its generator, `apgd` the length of its steps.
+/// Solvers with state of their own that is not saved: `shim` (the graph of its piles and the state of its
+/// impacts), `box2d` (the manifolds that it reuses), `random_order` (the state of its generator), `apgd` (its
+/// step length).
 const WITH_OWN_STATE: [&str; 4] = ["shim", "box2d", "random_order", "apgd"];
 
 #[test]
@@ -22,7 +23,7 @@ fn a_saved_world_goes_on_with_the_same_bits() {
             assert_eq!(saved.step_index, world.step_index);
             let mut same = true;
             for _ in 0..30 {
-                // A solver whose scene diverges does so in both.
+                // If a solver diverges, it does so in both worlds.
                 same &= world.step().map_err(|d| d.to_string()) == saved.step().map_err(|d| d.to_string());
                 same &= saved.state_hash() == world.state_hash();
             }

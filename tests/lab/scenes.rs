@@ -1,4 +1,4 @@
-//! Scenes: the file format, the catalog, and what every scene promises.
+//! Scenes: the file format, the catalog, and properties of every scene.
 
 use proptest::prelude::*;
 use simpulse::engine::bodies::BodyKind;
@@ -24,7 +24,7 @@ fn every_scene_is_valid_and_comes_back_from_json_with_the_same_bits() {
         scene.validate().unwrap_or_else(|e| panic!("{}: {e}", entry.name));
         assert!(entry.size.is_some() || scene.name == entry.name);
         let back = read(&scene.to_json()).unwrap_or_else(|e| panic!("{}: {e}", entry.name));
-        // Equality of floats takes −0 for 0; their text does not.
+        // Float equality treats −0 as 0, but the texts differ.
         assert_eq!(back, scene);
         assert_eq!(back.to_json(), scene.to_json());
         assert_eq!(format!("{back:?}"), format!("{scene:?}"));
@@ -54,7 +54,7 @@ fn names_are_unique_and_summaries_are_one_line() {
     }
 }
 
-/// Every file of the folder that is not part of the machinery declares entries, and all have a row.
+/// Every file of the folder that is not machinery declares entries, and every entry has a row.
 #[test]
 fn every_scene_file_has_its_rows() {
     const MACHINERY: [&str; 12] = [
@@ -104,7 +104,7 @@ fn every_scene_file_has_its_rows() {
 
 #[test]
 fn scenes_have_as_many_bodies_and_shapes_as_they_should() {
-    // Static or kinematic bodies, dynamic bodies.
+    // Number of static or kinematic bodies, and of dynamic bodies.
     let counts = [
         ("free_fall", 0, 1),
         ("incline_stick", 1, 1),
@@ -158,14 +158,14 @@ fn scenes_have_as_many_bodies_and_shapes_as_they_should() {
     assert_eq!(scene("junkyard").bodies[0].shapes.len(), 161 + 2 * 50);
     assert_eq!(scene("compounds").bodies[0].shapes.len(), 81 + 2 * 100 + 1);
     assert_eq!(scene("compounds").bodies.iter().skip(1).map(|b| b.shapes.len()).sum::<usize>(), 6000);
-    // The outermost corner of the grid of boxes is free of the drum: the wall's
-    // inner chords come as near as 16 cos 6° = 15.9 m, and the lobes, 14 m, are not on the diagonals.
+    // The outermost corner of the grid of boxes clears the drum. The wall's inner chords come as near as
+    // 16 cos 6° = 15.9 m, and the lobes, at 14 m, are not on the diagonals.
     let reach = |b: &SceneBody| b.position[0].hypot(b.position[1] - 10.0) + 0.1 * 2.0_f64.sqrt();
     let farthest = scene("washer").bodies[1..].iter().map(reach).fold(0.0, f64::max);
     assert!((14.0..15.9).contains(&farthest), "{farthest}");
 }
 
-/// Half extents of a box or disc whose axes are the world's.
+/// Half extents of a box or disc aligned with the world axes.
 fn upright(body: &SceneBody) -> Option<[f64; 2]> {
     match &body.shapes[0].geometry {
         Geometry::Box(b) if body.angle == 0.0 => Some(b.half),
@@ -175,7 +175,7 @@ fn upright(body: &SceneBody) -> Option<[f64; 2]> {
     }
 }
 
-/// Depth of the overlap of the bounds of two bodies (m); exact for boxes, and never too small for discs.
+/// Depth of the overlap of two bodies' bounds (m): exact for boxes, never too small for discs.
 fn overlap(a: &SceneBody, b: &SceneBody) -> f64 {
     let (Some(ha), Some(hb)) = (upright(a), upright(b)) else { panic!("not upright") };
     let depth = |k: usize| ha[k] + hb[k] - (a.position[k] - b.position[k]).abs();
@@ -183,7 +183,7 @@ fn overlap(a: &SceneBody, b: &SceneBody) -> f64 {
 }
 
 fn deepest(scene: &Scene) -> f64 {
-    // Bodies ordered by their left side: only those that start before one's right side can overlap it.
+    // Bodies sorted by their left side: only those that start before a body's right side can overlap it.
     let mut order: Vec<&SceneBody> = scene.bodies.iter().collect();
     let left = |b: &SceneBody| b.position[0] - upright(b).expect("upright")[0];
     order.sort_by(|a, b| left(a).total_cmp(&left(b)));
@@ -209,7 +209,7 @@ fn resting_scenes_start_without_overlap() {
     {
         assert!(deepest(&scene(name)) < f64::from(LINEAR_SLOP), "{name}: {}", deepest(&scene(name)));
     }
-    // And the test can see an overlap.
+    // The check does detect an overlap.
     assert!((deepest(&scene("overlap_recovery")) - 0.25).abs() < 1e-12);
 }
 
@@ -244,7 +244,7 @@ fn truths_expect_what_arithmetic_says() {
     ];
     for (name, expected) in cases {
         let truth = load(name).unwrap().truth.expect("a truth");
-        // Geometry is rounded to f32, so masses are good to 1e-7; the numbers above have six digits.
+        // Geometry is rounded to f32, so masses are accurate to 1e-7. The numbers above have six digits.
         assert!(
             (truth.expected - expected).abs() < 1e-6 * expected.abs().max(1.0),
             "{name}: {}",
@@ -254,7 +254,7 @@ fn truths_expect_what_arithmetic_says() {
     }
 }
 
-/// Runs a scene of the catalog to its end; the final error of its truth.
+/// Runs a scene of the catalog to its end. Returns the final error against its reference value.
 fn error_after_run(name: &str, solver: &str, substeps: u32, record_impulses: bool) -> Option<f64> {
     let Loaded { scene, truth, .. } = load(name).unwrap_or_else(|e| panic!("{e}"));
     let mut settings =
@@ -269,10 +269,9 @@ fn error_after_run(name: &str, solver: &str, substeps: u32, record_impulses: boo
     observer.error()
 }
 
-/// One rigid sweep per step solves one contact exactly, so what is left of the
-/// discrete truths is the rounding of the state: at most steps · ½ ulp in a
-/// velocity of up to 16 m/s (½ ulp is 5e-7), over 2 s: 120 · 5e-7 · 2 = 1.2e-4 for
-/// the fastest; the others are slower than 4 m/s, a quarter of that.
+/// One rigid sweep per step solves one contact exactly. What remains of the error against discrete solutions
+/// is the rounding of the state: at most steps · ½ ulp in a velocity of up to 16 m/s (½ ulp is 5e-7), over
+/// 2 s: 120 · 5e-7 · 2 = 1.2e-4 for the fastest. The others are slower than 4 m/s, a quarter of that.
 #[test]
 fn discrete_truths_hold_to_rounding_where_the_solver_is_exact() {
     let cases = [
@@ -289,12 +288,11 @@ fn discrete_truths_hold_to_rounding_where_the_solver_is_exact() {
         let error = error_after_run(name, "pgs", 1, false).expect("an error");
         assert!(error < bound, "{name}: {error}");
     }
-    // The same bookkeeping with substeps: a formula without them would be g h t/2 = 0.04 m off.
+    // The same with substeps. A formula that ignored them would be off by g h t/2 = 0.04 m.
     assert!(error_after_run("free_fall", "pgs", 4, false).expect("an error") < 1.2e-4);
 }
 
-/// A solver without friction must be found out: the box that should stick slides
-/// away, the one that should slow down does not.
+/// Reference values must expose a solver without friction: bodies slide too far, or do not slow down or roll.
 #[test]
 fn truths_find_a_missing_law() {
     for (name, at_least) in [("incline_slip", 1.0), ("sliding_stop", 1.0), ("slide_to_roll", 1.0)] {
@@ -365,7 +363,7 @@ fn the_pile_follows_its_seed() {
 #[test]
 fn wrong_names_and_sizes_are_named() {
     let message = |name: &str| load(name).err().map(|e| e.to_string()).unwrap_or_default();
-    // Too many names to repeat.
+    // There are too many names to list.
     assert_eq!(message("stak"), "unknown scene 'stak'; did you mean 'stack'?");
     assert_eq!(message("qqqqqqqqqqqqqq"), "unknown scene 'qqqqqqqqqqqqqq'");
     for size in ["0", "1001", "x", "", "-3", "1:2", "99999999999"] {
@@ -390,7 +388,7 @@ fn broken(from: &str, to: &str) -> String {
 fn bad_files_are_refused_with_place_and_value() {
     let disc = r#""circle": {"radius": 0.5}"#;
     let shape = "bodies[1].shapes[0]";
-    // What to replace, by what; where the error stands and what it must say.
+    // What to replace and by what; the position of the error and what the message must contain.
     let table = [
         (r#""name": "test""#, r#""name": """#, "name: ", "''"),
         (r#""name": "test""#, r#""name": "a\n\u001b[31m""#, "name: ", r#"is "a\n\u{1b}[31m""#),
@@ -538,7 +536,7 @@ fn what_is_left_out_has_its_default() {
     assert_eq!((shape.density, shape.friction, shape.restitution), (1.0, 0.6, 0.0));
 }
 
-/// Ordinary numbers, and some at the edge of 32 bits or of decimal notation.
+/// Ordinary numbers, and some at the limits of 32 bits or of decimal notation.
 fn number() -> impl Strategy<Value = f64> {
     prop_oneof![-1e3..1e3, Just(-0.0), Just(0.1), Just(1e-310), Just(-3.4e38), Just(1.0 / 3.0), Just(5e-324)]
 }
@@ -547,7 +545,7 @@ fn point() -> impl Strategy<Value = [f64; 2]> {
     [number(), number()]
 }
 
-/// Shapes that are valid wherever they lie.
+/// Shapes that are valid at any position.
 fn geometry() -> impl Strategy<Value = Geometry> {
     let near = || [-100.0..100.0, -100.0..100.0];
     let length = || 0.01..100.0;
@@ -601,7 +599,7 @@ fn body() -> impl Strategy<Value = SceneBody> {
 proptest! {
     #[test]
     fn any_scene_comes_back_with_the_same_bits(
-        // Control characters are refused, see below.
+        // Control characters are rejected, see below.
         name in "[a-zé\"\\\\ ]{1,8}[a-z]",
         gravity in point(),
         dt in 1e-6..1.0,
@@ -615,7 +613,7 @@ proptest! {
         prop_assert_eq!(back.to_json(), text);
     }
 
-    /// Any damage to a file is an error or a scene, never a panic.
+    /// Any damage to a file gives an error or a scene, never a panic.
     #[test]
     fn damaged_text_never_panics(at in 0.0..1.0, cut in 0_usize..20, put in "[\\[\\]{}:,\"0-9e.-]{0,6}") {
         let mut text = scene("arch").to_json();

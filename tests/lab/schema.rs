@@ -1,10 +1,10 @@
-//! The JSON schema of scenes agrees with what reading accepts and refuses.
+//! The JSON schema of scenes accepts and rejects the same files as the reader.
 
 use serde_json::{Value, json};
 use simpulse::lab::scenes::{self, CATALOG, SCHEMA, Scene};
 use std::path::Path;
 
-/// The keywords that the schema uses, and no others.
+/// Validates by the keywords that the schema uses, and no others.
 fn accepts(root: &Value, schema: &Value, value: &Value) -> bool {
     let number = |key: &str| schema.get(key).and_then(Value::as_f64);
     schema.as_object().unwrap().iter().all(|(key, rule)| match key.as_str() {
@@ -23,7 +23,7 @@ fn accepts(root: &Value, schema: &Value, value: &Value) -> bool {
             other => panic!("{other}"),
         },
         "enum" => rule.as_array().unwrap().contains(value),
-        // The only one: something that is not blank.
+        // The only pattern in use: text that is not blank.
         "pattern" if rule == "\\S" => value.as_str().is_none_or(|text| !text.trim().is_empty()),
         "minimum" => value.as_f64().is_none_or(|x| x >= number(key).unwrap()),
         "maximum" => value.as_f64().is_none_or(|x| x <= number(key).unwrap()),
@@ -64,7 +64,7 @@ fn every_scene_of_the_catalog_follows_the_schema() {
     }
 }
 
-/// Every kind of joint, with what it has besides what all have.
+/// Every kind of joint, with its members besides the common ones.
 const JOINTS: [(&str, &str); 8] = [
     ("revolute", "anchor_a anchor_b reference_angle spring motor limits"),
     ("prismatic", "anchor_a anchor_b axis reference_angle spring motor limits"),
@@ -76,7 +76,7 @@ const JOINTS: [(&str, &str); 8] = [
     ("filter", ""),
 ];
 
-/// Places of all members of joints, and of their springs and motors.
+/// Paths of all members of joints, and of their springs and motors.
 fn joint_places() -> Vec<String> {
     let mut places = vec!["/joints".to_string()];
     for (i, (kind, members)) in JOINTS.iter().enumerate() {
@@ -209,15 +209,16 @@ fn schema_and_reading_agree_on_every_member() {
             let mut changed = scene();
             *changed.pointer_mut(place).unwrap_or_else(|| panic!("{place}")) = value.clone();
             let (schema, reading) = (by_schema(&changed), by_reading(&changed));
-            // Beyond the schema: a dynamic body has shapes, and what is known of a body is of a dynamic one.
+            // Not in the schema: a dynamic body needs shapes, and a reference value belongs to a dynamic
+            // body.
             let beyond = place == "/bodies/1/shapes" && value == &json!([])
                 || place == "/bodies/1/type" && value == &json!("static")
-                // The joints are those of bodies 0 and 1.
+                // The joints connect bodies 0 and 1.
                 || place == "/bodies" && by_schema(&changed);
             assert_eq!(schema, reading || beyond, "{place} = {value}");
             if reading { accepted += 1 } else { refused += 1 }
         }
-        // Left out, and misspelled.
+        // Member removed, and misspelled.
         let (parent, name) = place.rsplit_once('/').unwrap();
         let mut changed = scene();
         if let Some(object) = changed.pointer_mut(parent).and_then(Value::as_object_mut) {

@@ -1,5 +1,5 @@
-//! The ten solvers of Solver2D against Solver2D itself: its figures, measured headless at 4 primary and
-//! 2 extra iterations over 10 s, are in `papers/solver2d.csv`.
+//! The ten solvers of Solver2D against Solver2D itself. Its figures, measured headless at 4 primary and 2
+//! extra iterations over 10 s, are in `papers/solver2d.csv`.
 
 use simpulse::engine::solvers::find;
 use simpulse::engine::world::{Order, World};
@@ -7,8 +7,8 @@ use simpulse::lab::metrics::Observation;
 use simpulse::lab::scenes::Scene;
 use std::path::Path;
 
-/// Its name, ours, the budget for n primary and 2 extra iterations (substeps, velocity, relaxing and
-/// position sweeps), and parameters that it has otherwise.
+/// Solver2D's name, our name, the budget for n primary and 2 extra iterations (substeps, velocity, relaxing
+/// and position sweeps), and parameter values of Solver2D that differ from ours.
 type Pairing = (&'static str, &'static str, fn(u32) -> [u32; 4], &'static [(&'static str, f32)]);
 const TEN: [Pairing; 10] = [
     ("Jacobi", "jacobi", |n| [1, n, 2, 0], &[]),
@@ -26,7 +26,7 @@ const TEN: [Pairing; 10] = [
 const SCENES: [&str; 6] =
     ["stack15", "pyramid20", "pyramid50", "heavy_on_small_400:1", "stack10_heavytop100:1", "circle_stack10"];
 
-/// Penetration over the last 5 s of 10 s, mean and greatest (mm), and the greatest drift (m).
+/// Mean and largest penetration over the last 5 s of 10 s (mm), and the largest drift (m).
 #[derive(Clone, Copy)]
 struct Figures {
     mean: f64,
@@ -35,13 +35,13 @@ struct Figures {
 }
 
 impl Figures {
-    /// Bodies that are half a box from their place have fallen, or sunk.
+    /// Bodies half a box away from their place have fallen or sunk.
     fn fell(&self) -> bool {
         self.drift > 0.5
     }
 }
 
-/// Solver2D's.
+/// Figures of Solver2D.
 fn published(scene: &str, solver: &str, n: u32) -> Figures {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("papers/solver2d.csv");
     let text = std::fs::read_to_string(path).unwrap();
@@ -50,7 +50,7 @@ fn published(scene: &str, solver: &str, n: u32) -> Figures {
     Figures { greatest: figure(3), mean: figure(4), drift: figure(6) }
 }
 
-/// The scene, and where its bodies belong (m).
+/// The scene, and the intended positions of its bodies (m).
 fn scene(name: &str) -> (Scene, Vec<[f64; 2]>) {
     let boxes = |at: &[[f64; 2]], half: f64, density: f64, friction: f64| {
         let body = |[x, y]: &[f64; 2]| {
@@ -74,7 +74,7 @@ fn scene(name: &str) -> (Scene, Vec<[f64; 2]>) {
         "pyramid20" => crate::common::scene("pyramid:20"),
         "pyramid50" => crate::common::scene("pyramid:50"),
         "circle_stack10" => crate::common::scene("disc_column:10"),
-        // Dropped from gaps of 0.1 m, shifted in turn.
+        // Dropped with gaps of 0.1 m, shifted alternately.
         "stack15" => {
             let dropped: Vec<_> = (0..15).map(|i| [sway(i), 0.55 + 1.1 * i as f64]).collect();
             let place = [vec![[0.0, -1.0]], column].concat();
@@ -89,11 +89,11 @@ fn scene(name: &str) -> (Scene, Vec<[f64; 2]>) {
     (scene, place)
 }
 
-/// Ours with n primary iterations; none if it diverged.
+/// Figures of our solver with n primary iterations; `None` if it diverged.
 fn measured(name: &str, (_, solver, budget, set): Pairing, n: u32) -> Option<Figures> {
     let variant = find(solver).unwrap();
     let mut settings = crate::common::settings(variant);
-    // Theirs solves contacts in the order of their creation.
+    // Solver2D solves contacts in the order of their creation.
     settings.order = Order::Natural;
     let [substeps, velocity, relax, position] = budget(n);
     settings.budget.substeps = substeps;
@@ -127,7 +127,7 @@ fn row(solver: &str) -> Pairing {
     *TEN.iter().find(|row| row.0 == solver).unwrap()
 }
 
-/// The whole comparison, as `papers/solver2d.md` has it.
+/// The whole comparison, as in `papers/solver2d.md`.
 #[test]
 #[ignore = "prints a table; a minute"]
 fn print_the_comparison() {
@@ -150,8 +150,8 @@ fn print_the_comparison() {
     }
 }
 
-/// Springs of the same stiffness sag by the same load: where a solver's contacts are soft and come to rest,
-/// the mean penetration is Solver2D's.
+/// Springs of the same stiffness sag by the same amount under the same load. Where a solver's contacts are
+/// soft and come to rest, the mean penetration matches Solver2D's.
 #[test]
 fn soft_solvers_sag_as_solver2d_does() {
     for (scene, solvers) in [
@@ -167,7 +167,7 @@ fn soft_solvers_sag_as_solver2d_does() {
     }
 }
 
-/// Who stands and who sinks under the heavy box, and who survives the pyramid, is the same.
+/// The same solvers stand or sink under the heavy box, and the same solvers survive the pyramid.
 #[test]
 fn the_same_solvers_fail() {
     for pairing in TEN {
@@ -178,15 +178,15 @@ fn the_same_solvers_fail() {
     }
 }
 
-/// The growth per substep of what is left over in a pyramid of sticking unit boxes when a substep
-/// applies the last impulses once more and sweeps once: the greatest |z| of `papers/solver2d.md`.
-/// `rows` are the rows of a contact in their order: point, and normal (0) or tangent (1).
+/// Growth per substep of the residual velocities in a pyramid of sticking unit boxes, when a substep applies
+/// the last impulses again and sweeps once: the largest |z| of `papers/solver2d.md`. `rows` lists the rows of
+/// a contact in their order: point, and normal (0) or tangent (1).
 fn growth(base: usize, rows: [(usize, usize); 4]) -> f64 {
     let mut place = Vec::new();
     for level in 0..base {
         place.extend((0..base - level).map(|i| [0.5 * level as f64 + i as f64, level as f64 + 0.5]));
     }
-    // A contact: the lower box if there is one, the upper one, x of both points, y.
+    // A contact: the lower box if there is one, the upper box, x of both points, y.
     let touches = |a: [f64; 2], b: [f64; 2]| b[1] - a[1] == 1.0 && (b[0] - a[0]).abs() < 1.0;
     let mut contacts: Vec<(Option<usize>, usize, [f64; 2], f64)> =
         (0..base).map(|b| (None, b, [place[b][0] - 0.5, place[b][0] + 0.5], 0.0)).collect();
@@ -217,7 +217,7 @@ fn growth(base: usize, rows: [(usize, usize); 4]) -> f64 {
         }
     };
     let size = |velocity: &[[f64; 3]]| velocity.iter().flatten().map(|v| v * v).sum::<f64>().sqrt();
-    // Means over windows, since it oscillates.
+    // Means over windows, since the size oscillates.
     let (windows, window) = ([2000, 5000], 500);
     let mut sums = [0.0; 2];
     for substep in 0..windows[1] + window {
@@ -241,13 +241,13 @@ fn growth(base: usize, rows: [(usize, usize); 4]) -> f64 {
     (sums[1] / sums[0]).powf(1.0 / f64::from(windows[1] - windows[0]))
 }
 
-/// One rigid sweep per substep grows or dies out by the order of the rows of a contact alone.
+/// Whether one rigid sweep per substep grows or decays depends on the order of a contact's rows alone.
 #[test]
 fn the_order_of_rows_decides_whether_one_rigid_sweep_is_stable() {
     let (normals_first, by_points) = ([(0, 0), (1, 0), (0, 1), (1, 1)], [(0, 0), (0, 1), (1, 0), (1, 1)]);
     let [first, points] = [normals_first, by_points].map(|rows| growth(14, rows));
     println!("normals first {first:.5}, point by point {points:.5}");
-    // By the eigenvalues 1.00278 and 0.99674.
+    // From the eigenvalues 1.00278 and 0.99674.
     assert!((first - 1.00278).abs() < 2e-4, "{first}");
     assert!((points - 0.99674).abs() < 2e-4, "{points}");
 }

@@ -1,4 +1,4 @@
-//! Solver laws on contacts whose answer is known by hand.
+//! Solver laws on contacts with hand-computed results.
 
 use simpulse::engine::constraints::{ImpactLaw, Impacts};
 use simpulse::engine::params::LINEAR_SLOP;
@@ -13,9 +13,9 @@ fn build(text: &str, solver: &str) -> World {
 
 const GROUND: &str = r#"{"type":"static","position":[0,-1],"shapes":[{"box":{"half":[50,1]}}]}"#;
 
-/// A box thrown flat onto the ground: both corners share the stopping impulse. The first row
-/// stops its corner alone and overshoots; the second takes part of that back. With clamped
-/// increments instead of clamped totals nothing could be taken back.
+/// A box thrown flat onto the ground: both corners share the stopping impulse. The first row stops its corner
+/// alone and overshoots. The second takes part of that back. With clamped increments instead of clamped
+/// totals, nothing could be taken back.
 #[test]
 fn the_accumulated_impulse_is_clamped() {
     let text = format!(
@@ -76,7 +76,8 @@ fn baumgarte_removes_its_fraction() {
     world.step().unwrap();
     let depth = 0.5 - world.bodies.position_y[1] as f64;
     assert!((depth - (0.05 - 0.3 * 0.045)).abs() < 1e-6, "{depth}");
-    // The push stays when the body has left: m (β C/h)²/2, C being the overlap beyond the slop.
+    // The energy of the push remains after the body has left: m (β C/h)²/2, with C the overlap beyond the
+    // slop.
     for _ in 0..60 {
         world.step().unwrap();
     }
@@ -85,7 +86,7 @@ fn baumgarte_removes_its_fraction() {
     assert!((speed - 0.3 * 0.045 * 60.0).abs() < 1e-5, "{speed}");
 }
 
-/// Projection puts a body on the surface at once, and its velocity with it.
+/// Projection puts a body on the surface at once, without normal velocity.
 #[test]
 fn projection_ends_on_the_surface_at_rest() {
     let text = format!(
@@ -99,8 +100,8 @@ fn projection_ends_on_the_surface_at_rest() {
     assert_eq!(world.bodies.velocity_x[1], 1.0, "no friction");
 }
 
-/// No solver lets a fast disc through the gap that a step leaves: speculative contacts stop it
-/// at the surface, projection puts it back.
+/// No solver lets a fast disc through the gap within a step: speculative contacts stop it at the surface, and
+/// projection puts it back.
 #[test]
 fn a_falling_disc_stops_at_the_ground() {
     for variant in &VARIANTS {
@@ -113,15 +114,16 @@ fn a_falling_disc_stops_at_the_ground() {
             world.step().unwrap();
         }
         let y = world.bodies.position_y[1];
-        // What falls by more than the look ahead in a step may end behind the surface, and overlap up to the slop is left alone.
+        // A body that falls farther than the look-ahead distance in a step may end behind the surface.
+        // Overlap up to the slop is left alone.
         let slop = variant.parameter("slop").map_or(LINEAR_SLOP, |place| variant.defaults()[place]);
         assert!((y - 0.5).abs() < slop + 0.001, "{}: {y}", variant.name);
         assert!(world.bodies.velocity_y[1].abs() < 1e-3, "{}", variant.name);
     }
 }
 
-/// Under waves of impacts a ball returns to e² of its height, whatever the step and the substeps: the rebound keeps the
-/// energy that semi-implicit Euler keeps in flight. The highest of the sampled positions is
+/// Under waves of impacts a ball returns to e² of its height, whatever the step and the substeps: the rebound
+/// conserves the energy that semi-implicit Euler conserves in flight. The highest of the sampled positions is
 /// within g h²/8 of the apex of the discrete orbit, 0.35 mm at 1/60 s.
 #[test]
 fn a_ball_returns_to_e_squared_of_its_height() {
@@ -148,8 +150,8 @@ fn a_ball_returns_to_e_squared_of_its_height() {
     }
 }
 
-/// A disc that reaches the ground at 5 m/s in the coming step, without gravity, so that every law has the same speed to
-/// work with.
+/// A disc that reaches the ground at 5 m/s in the coming step. Without gravity, every law works with the same
+/// speed.
 #[test]
 fn what_comes_in_leaves_as_the_solver_s_own_law_has_it() {
     for variant in &VARIANTS {
@@ -171,8 +173,8 @@ fn what_comes_in_leaves_as_the_solver_s_own_law_has_it() {
     }
 }
 
-/// Box2D and Bullet give back the speed that a step begins with, so what falls rises a little higher or lower by the
-/// step: the pass at the end takes no height into account.
+/// Box2D and Bullet return the speed at the beginning of the step. So a falling body rises slightly higher or
+/// lower, depending on the step: the pass at the end ignores height.
 #[test]
 fn a_pass_at_the_end_of_the_step_gives_back_the_speed_of_its_beginning() {
     let text = format!(
@@ -184,9 +186,9 @@ fn a_pass_at_the_end_of_the_step_gives_back_the_speed_of_its_beginning() {
     assert!((world.bodies.velocity_y[1] - 4.0).abs() < 1e-5, "{}", world.bodies.velocity_y[1]);
 }
 
-/// The contact point of a disc stays below its center however fast it rolls: a disc at 20 rad/s
-/// rolls as deep as it rests. (An anchor that turned with the disc, as a corner's does, would rise by
-/// r (1 − cos ω h) within a step, 12 mm here in the last of four substeps, and the disc would follow.)
+/// The contact point of a disc stays below its center however fast it rolls: a disc at 20 rad/s is as deep as
+/// at rest. (An anchor that turned with the disc, as a corner's does, would rise by r (1 − cos ω h) within a
+/// step, 12 mm here in the last of four substeps, and the disc would follow.)
 #[test]
 fn a_rolling_disc_rolls_as_deep_as_it_rests() {
     let text = format!(
@@ -204,14 +206,14 @@ fn a_rolling_disc_rolls_as_deep_as_it_rests() {
         }
     }
     assert!((world.bodies.velocity_x[1] - 10.0).abs() < 1e-3);
-    // Its pose has turned all the same, by 20 rad/s over 3 s.
+    // Its pose still turns, by 20 rad/s over 3 s.
     let angle = world.bodies.angle(1) as f64;
     let truth = (-60.0_f64).rem_euclid(std::f64::consts::TAU);
     assert!((angle.rem_euclid(std::f64::consts::TAU) - truth).abs() < 1e-2, "{angle} for {truth}");
 }
 
 /// A body on a contact of compliance α sinks by α times its weight (`macklin2016`), whatever the number of
-/// iterations and substeps. A disc, since it has one contact point.
+/// iterations and substeps. The body is a disc, since a disc has one contact point.
 #[test]
 fn a_compliant_contact_gives_way_by_the_load_whatever_the_iterations() {
     let text = format!(
@@ -241,7 +243,7 @@ fn a_compliant_contact_gives_way_by_the_load_whatever_the_iterations() {
     }
 }
 
-/// Two points bear half the weight each: a box sinks by α m g/2.
+/// Two points carry half the weight each: a box sinks by α m g/2.
 #[test]
 fn two_compliant_points_give_way_by_half() {
     let text = format!(
@@ -259,8 +261,9 @@ fn two_compliant_points_give_way_by_half() {
     assert!((sunk - 5e-4).abs() < 5e-6, "{sunk}");
 }
 
-/// A column of 20 boxes under one that is 900 times as heavy, with ten iterations of each. AVBD bends the column by its
-/// penalties and holds (`giles2025` shows a hanging chain of 20 links with such a ball); sequential impulses fall.
+/// A column of 20 boxes under a box 900 times as heavy, with ten iterations for each solver. Under AVBD the
+/// column gives way by its penalties and holds (`giles2025` shows a hanging chain of 20 links with such a
+/// ball). Under sequential impulses it falls.
 #[test]
 fn avbd_holds_a_heavy_box_on_a_column_under_which_sequential_impulses_fall() {
     let height = |solver: &str| {
@@ -285,8 +288,9 @@ fn avbd_holds_a_heavy_box_on_a_column_under_which_sequential_impulses_fall() {
     assert!(pgs < 10.0, "{pgs}");
 }
 
-/// Penalties of AVBD grow by β |C| an iteration whatever the load is (`giles2025`): what carries 1000 times as much sinks
-/// until they have grown. Sequential impulses scale with the load and sink alike. Sums of overlaps under five boxes.
+/// Penalties of AVBD grow by β |C| per iteration whatever the load is (`giles2025`). Contacts that carry 1000
+/// times as much sink until they have grown. Sequential impulses scale with the load and sink alike. Compares
+/// sums of overlaps under five boxes.
 #[test]
 fn avbd_gives_way_to_dense_bodies_and_sequential_impulses_do_not() {
     let sunk = |solver: &str, density: u32| {

@@ -1,5 +1,5 @@
-//! The frozen problems under `tests/frozen`: their solutions hold, and every family of methods
-//! finds them again.
+//! The frozen problems in `tests/frozen`: their stored solutions are valid, and every family of methods finds
+//! them again.
 
 use simpulse::lab::reference::certify::{AGREED, CERTIFIED, certify, reference};
 use simpulse::lab::reference::frozen::Frozen;
@@ -20,7 +20,7 @@ fn library() -> Vec<Frozen> {
     gallery::library().iter().map(|(name, _)| Frozen::read(&path(name)).unwrap()).collect()
 }
 
-/// Writes the library. The files are inputs of the tests: run it only to extend them.
+/// Writes the library. The files are test inputs: run this only to extend them.
 #[test]
 #[ignore = "rewrites tests/frozen"]
 fn generate() {
@@ -84,9 +84,9 @@ fn every_family_reproduces_the_stored_velocities() {
     }
 }
 
-/// Lemke must certify an answer to every shaken pyramid, jammed or not: in theory there is one
-/// (copositive matrix, right-hand sides ≥ 0). Before a vanished artificial variable counted as having
-/// left, two thirds of such problems ended on spurious rays.
+/// Lemke's method must certify a solution of every shaken pyramid, jammed or not: in theory there is one
+/// (copositive matrix, right-hand sides ≥ 0). Before a vanished artificial variable counted as having left
+/// the basis, two thirds of such problems ended on spurious rays.
 #[test]
 fn shaken_pyramids_are_certified() {
     for (base, friction) in [(2, 0.6), (3, 0.6), (4, 0.6), (6, 0.6), (6, 0.1), (6, 1.5)] {

@@ -1,5 +1,5 @@
-//! The hard cases: the list is whole and documented, wrong physics fails, results repeat, and the
-//! exit code asks for what was promised and nothing else.
+//! The hard cases: the list is complete and documented, wrong physics fails, results repeat, and the exit
+//! code reflects required cases only.
 
 use simpulse::engine::constraints::Impacts;
 use simpulse::engine::solvers::{self, DEFAULT, VARIANTS, Variant};
@@ -40,7 +40,7 @@ fn every_case_of_the_list_is_there_once_and_documented() {
         }
         assert!(VARIANTS.iter().any(|v| case.law_of.includes(v)), "{}: the law of no solver", case.id);
     }
-    // Sections A and B of the list; A11, A12, B11 and B18 are not in it.
+    // Sections A and B of the list. It has no A11, A12, B11 or B18.
     let a = (0..=18).filter(|n| ![11, 12].contains(n)).map(|n| format!("A{n}"));
     let b = (1..=22).filter(|n| ![11, 18].contains(n)).map(|n| format!("B{n}"));
     for id in a.chain(b) {
@@ -55,16 +55,16 @@ fn names_select_cases_and_families() {
         verify::select(&names).unwrap().iter().map(|case| case.id).collect()
     };
     assert_eq!(ids(&["b9.gap", "A0"]), ["A0.fall", "B9.gap"]);
-    // B1 is not the beginning of B10.
+    // B1 does not select B10.
     assert_eq!(ids(&["B1"]), ["B1.loads"]);
     assert_eq!(ids(&[]).len(), CASES.len());
     let error = verify::select(&["B9.gapp".to_string()]).err().unwrap().to_string();
     assert!(error.contains("'B9.gapp'") && error.contains("'B9.gap'"), "{error}");
 }
 
-/// In wrong physics, all of `ids` fail that pass in the right one.
+/// With wrong physics all of `ids` fail; with correct physics they pass.
 fn fails_if(change: fn(&mut Scene), ids: &[&str]) {
-    // Waves, since several cases are of impacts.
+    // Waves, since several cases test impacts.
     let lab = |solver| Lab::new(solver).impacts(Impacts::Waves);
     let right = run(ids, &[solvers::find("pgs").unwrap()], 2, lab);
     assert_eq!(failed(&right), [""; 0], "must pass unchanged");
@@ -153,12 +153,12 @@ fn other_wrong_physics_fails() {
     fails_if(wide, &["A25.overhang"]);
     let fast = |scene: &mut Scene| scene.bodies.iter_mut().for_each(|body| body.angular_velocity *= 1.001);
     fails_if(fast, &["A16.spin"]);
-    // Heavier: the loads are no longer those of the masses on paper.
+    // Heavier bodies: loads no longer match the masses computed by hand.
     let heavy = |scene: &mut Scene| {
         scene.bodies.iter_mut().flat_map(|b| &mut b.shapes).for_each(|shape| shape.density *= 1.02);
     };
     fails_if(heavy, &["A1.split", "B1.loads", "B7.pyramid", "B8.plank"]);
-    // A bounce that gives energy instead of keeping it from growing.
+    // A bounce that adds energy.
     let hop = |scene: &mut Scene| scene.bodies[1].velocity[1] = 1.0;
     fails_if(hop, &["B13.hop"]);
 }
@@ -173,7 +173,7 @@ fn soft_truths_fail_without_their_load() {
     assert_eq!(failed(&wrong), ids);
 }
 
-/// Cheap cases of every family of arithmetic.
+/// Cheap cases for every family of arithmetic.
 const FAST: &[&str] =
     &["A0", "A1.slip", "A2", "A3.roll", "A7", "A8", "A16", "A18", "B3.recovery", "B9", "B12", "B13"];
 
@@ -186,7 +186,7 @@ fn results_repeat_for_every_solver_and_any_number_of_threads() {
     };
     let one = numbers(1);
     assert_eq!(one, numbers(3));
-    // B3.recovery alone is not everyone's law.
+    // Only B3.recovery does not apply to every solver.
     let others = solvers.iter().filter(|v| !LawOf::SpringsSweptOnce.includes(v)).count();
     assert!(one.iter().filter(|cell| cell.starts_with("Foreign")).count() == others, "{one:?}");
 }
@@ -227,7 +227,8 @@ fn only_broken_promises_of_the_solver_itself_count() {
     assert_eq!(matrix(vec![vec![good(), good()], vec![good(), good()]]).broken_promises("projection"), None);
 }
 
-/// Required cases that the default solver fails. What joins this list is news, and belongs into the README.
+/// Required cases that the default solver fails. A case that joins this list is news and belongs in the
+/// README.
 const FAILS: &[&str] = &[];
 
 #[test]

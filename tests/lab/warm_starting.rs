@@ -1,11 +1,10 @@
-//! Warm starting turns frames into sweeps: on a column of discs, where the rate of
+//! With warm starting, sweeps of earlier frames count. Tested on a column of discs, where the rate of
 //! Gauss–Seidel is known exactly.
 //!
-//! N discs of mass m stand on each other. With λ the impulse of each contact, bottom first,
-//! the exact answer is λ_i = (N − i) m g h. A Gauss–Seidel sweep from the ground up is, for this
-//! tridiagonal problem, a sweep on the one-dimensional Laplacian fixed at one end, whose
-//! Jacobi matrix has the largest eigenvalue cos(π/2N); the error of Gauss–Seidel therefore
-//! shrinks by cos²(π/2N) per sweep.
+//! N discs of mass m stand on each other. With λ the impulse of each contact, bottom first, the exact answer
+//! is λ_i = (N − i) m g h. For this tridiagonal problem, a Gauss–Seidel sweep from the ground up is a sweep
+//! on the one-dimensional Laplacian fixed at one end. The largest eigenvalue of its Jacobi matrix is
+//! cos(π/2N). The error of Gauss–Seidel therefore shrinks by cos²(π/2N) per sweep.
 
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers;
@@ -13,7 +12,7 @@ use simpulse::engine::world::{Order, World};
 
 const DISCS: usize = 10;
 
-/// A column whose solver makes `sweeps` sweeps per step.
+/// A column whose solver runs `sweeps` sweeps per step.
 fn column(sweeps: u32, order: Order) -> World {
     let mut settings = crate::common::with_width(solvers::find("pgs").unwrap(), LaneWidth::W1);
     settings.order = order;
@@ -86,7 +85,7 @@ fn warm_starting_cuts_the_sweeps_to_a_residual() {
         })
     };
     let (cold, warm) = (sweeps_needed(0).unwrap(), sweeps_needed(6).unwrap());
-    // 6 frames of 20 sweeps are 120 sweeps that the warm start saves.
+    // 6 frames of 20 sweeps: the warm start saves 120 sweeps.
     assert!(cold > 120, "{cold}");
     assert!((cold - warm).abs_diff(120) <= 1, "{cold} cold, {warm} warm");
 }

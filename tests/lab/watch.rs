@@ -1,4 +1,5 @@
-//! Iterations can be watched: every solver shows each of its own, and what it shows is the problem.
+//! Iterations can be watched: every solver reports each of its iterations, with the problem as it stands
+//! then.
 
 use simpulse::engine::constraints::System;
 use simpulse::engine::constraints::step::Watch;
@@ -7,7 +8,7 @@ use simpulse::engine::world::World;
 use std::sync::Arc;
 use std::sync::Mutex;
 
-/// What a watch saw in one step of a pyramid: iteration and residual of the rigid law (N·s).
+/// Reports of one step of a pyramid: iteration and residual of the rigid law (N·s).
 fn watched(variant: &'static Variant, iterations: u32) -> Vec<(u32, f64)> {
     let mut settings = crate::common::settings(variant);
     settings.budget = variant.of_iterations(iterations);

@@ -1,4 +1,4 @@
-//! Law: the number of lanes changes the time a step takes and nothing else.
+//! Law: the number of lanes changes the run time of a step and nothing else.
 
 use crate::common::{run, settings, with_width};
 use simpulse::engine::lanes::LaneWidth;
@@ -6,8 +6,8 @@ use simpulse::engine::solvers::{VARIANTS, find};
 use simpulse::engine::world::{Order, Settings};
 use simpulse::lab::scenes;
 
-/// Scenes that differ in what their kernels need: discs with and without friction, boxes,
-/// polygons, restitution, kinematic bodies, colors that run out.
+/// Scenes whose kernels use different features: discs with and without friction, boxes, polygons,
+/// restitution, kinematic bodies, exhausted colors.
 const SCENES: [&str; 8] = [
     "disc_column:10",
     "stack:12",
@@ -67,7 +67,7 @@ fn the_same_run_twice_gives_the_same_bits() {
 
 #[test]
 fn the_order_of_constraints_does_change_the_bits() {
-    // Else the hashes above would compare nothing.
+    // Otherwise the hashes above would compare nothing.
     let scene = crate::common::scene("pyramid:10");
     let colored = run(&scene, settings(find("pgs").unwrap()), 50);
     let mut natural = settings(find("pgs").unwrap());

@@ -1,12 +1,12 @@
-//! A real browser without a window: Chromium, if it is installed.
+//! A real browser without a window: Chromium, if installed.
 //!
-//! A page is copied with a script before it that notes every error, and one behind it that drives its
-//! controls and leaves what it found in the document.
+//! A page is copied with a script in front that records every error, and a script behind it that operates the
+//! page's controls and leaves its findings in the document.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// Where Chromium is: the variable `CHROMIUM`, or one of its usual names on the path.
+/// Path of Chromium: the variable `CHROMIUM`, or one of its usual names on the path.
 fn find() -> Option<PathBuf> {
     if let Some(given) = std::env::var_os("CHROMIUM") {
         return Some(given.into());
@@ -16,7 +16,7 @@ fn find() -> Option<PathBuf> {
     names.iter().find_map(|name| folders.iter().map(|f| f.join(name)).find(|p| p.is_file()))
 }
 
-/// The browser, or a line that says why a test does nothing.
+/// The browser, or `None` and a printed line that states why a test is skipped.
 pub fn or_skip(test: &str) -> Option<PathBuf> {
     let found = find();
     if found.is_none() {
@@ -42,8 +42,8 @@ fn url(path: &Path, fragment: &str) -> String {
     format!("file://{}#{fragment}", path.display())
 }
 
-/// Loads a copy of `page`, waits until its replays are ready, runs the body of an async function that
-/// returns an object, and gives that object with the errors of the page under `errors`.
+/// Loads a copy of `page`, waits until its replays are ready, and runs the body of an async function that
+/// returns an object. Returns that object, with the errors of the page under `errors`.
 pub fn drive(browser: &Path, page: &Path, fragment: &str, script: &str) -> serde_json::Value {
     let folder = tempfile::tempdir().unwrap();
     let before = "<script>window.faults = []; addEventListener('error', (e) => faults.push(String(e.message)));
@@ -76,7 +76,7 @@ pub fn drive(browser: &Path, page: &Path, fragment: &str, script: &str) -> serde
     serde_json::from_str(&plain).unwrap()
 }
 
-/// The pixels of a page as a window of this size shows it.
+/// The pixels of a page in a window of this size.
 pub fn screenshot(browser: &Path, page: &Path, fragment: &str, [width, height]: [usize; 2]) -> Vec<[u8; 3]> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("shot.png");
@@ -88,7 +88,7 @@ pub fn screenshot(browser: &Path, page: &Path, fragment: &str, [width, height]: 
     pixels
 }
 
-/// A PNG of 8 bits with or without opacity, not interlaced.
+/// Decodes a PNG of 8 bits, with or without opacity, not interlaced.
 pub fn decode(file: &[u8]) -> ([usize; 2], Vec<[u8; 3]>) {
     let number = |at: usize| u32::from_be_bytes(file[at..at + 4].try_into().unwrap()) as usize;
     let (width, height) = (number(16), number(20));
@@ -142,7 +142,7 @@ pub fn decode(file: &[u8]) -> ([usize; 2], Vec<[u8; 3]>) {
     ([width, height], pixels)
 }
 
-/// How many pixels have this color, to within a step or two per channel.
+/// Number of pixels of this color, to within a step or two per channel.
 pub fn count(pixels: &[[u8; 3]], color: [u8; 3]) -> usize {
     pixels.iter().filter(|p| (0..3).all(|k| p[k].abs_diff(color[k]) <= 2)).count()
 }

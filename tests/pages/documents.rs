@@ -1,5 +1,5 @@
-//! What README and papers print runs: commands parse with the program's own parser, the quick ones run, tests that they name
-//! exist.
+//! Commands printed in the README and the papers work: they parse with the program's own parser, the quick
+//! ones run, and the tests that they name exist.
 
 use clap::Parser;
 use simpulse::cli::args::Cli;
@@ -45,7 +45,7 @@ fn commands(text: &str) -> Vec<String> {
     found
 }
 
-/// Words of a command of this program; its name and a subcommand's alone are a mention.
+/// Words of a complete command of this program; `None` for a mere mention of a subcommand.
 fn words(command: &str) -> Option<Vec<&str>> {
     let is_complete = !command.contains(['…', '<', '(', '{']) && !command.contains("NAME");
     let words: Vec<&str> =
@@ -79,7 +79,7 @@ fn tests_that_the_documents_name_exist() {
             if path.is_dir() {
                 folders.push(path);
             } else if path.extension().is_some_and(|e| e == "rs") {
-                // Modules are filters, too.
+                // Module names are valid filters, too.
                 sources += &format!("fn {}\n", path.file_stem().unwrap().to_string_lossy());
                 sources += &std::fs::read_to_string(path).unwrap();
             }
@@ -96,7 +96,7 @@ fn tests_that_the_documents_name_exist() {
             if let Some(k) = words.iter().position(|&word| word == "--test") {
                 assert!(manifest.contains(&format!("name = \"{}\"", words[k + 1])), "{name}: {command}");
             }
-            // A filter comes last, behind an option's value or a flag.
+            // A filter is the last word, after an option's value or a flag.
             let Some(&filter) = words.last().filter(|_| words.len() > 5 || words.contains(&"--lib")) else {
                 continue;
             };
@@ -126,7 +126,7 @@ fn quick_commands_of_the_readme_run() {
     assert!(count >= 4, "{count} commands ran");
 }
 
-/// Every claim is within the range that its row states.
+/// Every claim is within the range stated in its row.
 #[test]
 fn claims_are_within_their_ranges() {
     let printed = super::succeeds(root(), &["papers"]);

@@ -21,7 +21,7 @@ fn a_snapshot_is_svg_or_png_by_its_name() {
     refused(path, &["snapshot", "staack", "-o", "b.svg"], &["'staack'", "'stack'"]);
     refused(path, &["snapshot", "stack:4", "-o", "b.svg", "--lanes", "3"], &["lanes", "3"]);
     refused(path, &["snapshot", "stack:4", "-o", "b.svg", "--scale", "0mm"], &["--scale", "0mm"]);
-    // One scale for all pictures: micrometers look like nothing, unless a scale of micrometers is asked for.
+    // All pictures have the same scale: micrometers are invisible unless a scale of micrometers is requested.
     let colors = |options: &[&str]| {
         succeeds(path, &[&["snapshot", "stack:2", "--without", "statics", "-o", "c.svg"], options].concat());
         let text = std::fs::read_to_string(path.join("c.svg")).unwrap();
@@ -42,7 +42,7 @@ fn the_same_frame_is_the_same_file_at_every_width() {
         succeeds(path, &["snapshot", "arch", "--step", "20", "--lanes", lanes, "-o", &name]);
     }
     let pictures = ["1.png", "8.png"].map(|n| decode(&std::fs::read(path.join(n)).unwrap()));
-    // Above the scene is a line that names the lanes.
+    // The line above the scene names the lanes, so it is cut off.
     let [a, b] = pictures.map(|([width, _], pixels)| pixels[66 * width..].to_vec());
     assert!(a.len() > 100_000 && a == b);
 }

@@ -1,4 +1,4 @@
-//! What an interrupt leaves behind, and what two runs of one program differ by.
+//! Files left after an interrupt, and differences between two runs of the same program.
 
 use crate::{simpulse, succeeds};
 use simpulse::lab::compare::{CompareOptions, Comparison, Verdict, compare};
@@ -19,7 +19,7 @@ fn an_interrupt_keeps_what_was_there_and_leaves_nothing_behind() {
         let mut run = Command::new(env!("CARGO_BIN_EXE_simpulse"));
         let run = run.current_dir(path).args(args).stdout(Stdio::piped()).stderr(Stdio::piped());
         let child = run.spawn().unwrap();
-        // Its folder is in use as soon as the study has begun.
+        // The folder is in use as soon as the study has begun.
         while std::fs::read_dir(path.join(out)).map_or(0, |all| all.count()) < usize::from(out == "old") + 1 {
             std::thread::sleep(Duration::from_millis(5));
         }
@@ -35,22 +35,23 @@ fn an_interrupt_keeps_what_was_there_and_leaves_nothing_behind() {
     assert!(!path.join("new").exists());
 }
 
-/// Two studies as `simpulse compare` has them.
+/// Compares two studies as `simpulse compare` does.
 fn compared(before: &Path, after: &StudyFile) -> Comparison {
     let before = StudyFile::read(before).unwrap();
     compare(&before, after, &CompareOptions { threshold: 0.05, relative: false })
 }
 
-/// Settings and solvers whose time is judged worse, and better.
+/// Number of settings and solvers whose time is judged worse, and better.
 fn told(found: &Comparison) -> [usize; 2] {
     let times = found.pairs.iter().filter_map(|pair| pair.time.map(|time| time.verdict(found.threshold)));
     let verdicts: Vec<_> = times.chain(found.solvers.iter().map(|s| s.verdict(found.threshold))).collect();
     [Verdict::Worse, Verdict::Better].map(|verdict| verdicts.iter().filter(|v| **v == verdict).count())
 }
 
-/// `cargo test --release --test pages null_race -- --ignored --nocapture`: how often one program against itself
-/// is told to differ (never, also on a busy machine), and how often one solver that is slower by a tenth is found
-/// (nine times of ten). The slower one is made of the second run: its times, a tenth longer.
+/// `cargo test --release --test pages null_race -- --ignored --nocapture`: how often a program compared with
+/// itself is reported to differ (never, even on a busy machine), and how often a solver that is slower by a
+/// tenth is found (nine times out of ten). The slower solver is the second run with its times lengthened by a
+/// tenth.
 #[test]
 #[ignore = "takes minutes"]
 fn null_race() {
@@ -79,8 +80,8 @@ fn null_race() {
     assert!(differ == 0 && 10 * found >= 9 * TRIES);
 }
 
-/// `cargo test --release --test pages agree_on_the_time -- --ignored --nocapture`: what `run`, `study` and `profile` call
-/// the time of a step and of its phases is the same, within a fifth.
+/// `cargo test --release --test pages agree_on_the_time -- --ignored --nocapture`: `run`, `study` and
+/// `profile` report the same time for a step and its phases, within a fifth.
 #[test]
 #[ignore = "measures times; needs a machine that is not too busy"]
 fn commands_agree_on_the_time_of_a_step() {

@@ -1,4 +1,5 @@
-//! Pictures, recordings and pages as a user meets them; pages in a real browser where there is one.
+//! Pictures, recordings and pages from the user's point of view. Pages are tested in a real browser if there
+//! is one.
 
 mod browser;
 mod documents;
@@ -21,14 +22,14 @@ fn simpulse(folder: &Path, args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_simpulse")).current_dir(folder).args(args).output().unwrap()
 }
 
-/// Runs it; it must succeed. Returns standard output.
+/// Runs the program, which must succeed. Returns standard output.
 fn succeeds(folder: &Path, args: &[&str]) -> String {
     let output = simpulse(folder, args);
     assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Runs it; it must refuse in one line that has these parts, and leave no file.
+/// Runs the program, which must reject its arguments in one line with these parts, and leave no file.
 fn refused(folder: &Path, args: &[&str], parts: &[&str]) {
     let count = || std::fs::read_dir(folder).unwrap().count();
     let before = count();

@@ -93,7 +93,7 @@ fn the_controls_do_what_they_say() {
         found["panned"][0].as_f64().unwrap() < 0.0 && found["panned"][1].as_f64().unwrap() > 0.0,
         "{found}"
     );
-    // Every canvas has something on it.
+    // No canvas is empty.
     assert!(found["ink"].as_array().unwrap().iter().all(|n| n.as_u64().unwrap() > 1000), "{found}");
     assert!(found["text"].as_str().unwrap().contains("of 2.00 s"), "{found}");
 }
@@ -113,7 +113,7 @@ fn a_screenshot_shows_bodies_impulses_and_curves() {
         let found = count(&pixels, color);
         assert!(found >= least, "{what}: {found} pixels");
     }
-    // The same again 0.5 s later is another picture: the address sets the time.
+    // A screenshot at another time differs: the address sets the time.
     let start = screenshot(&browser, &folder.path().join("r.html"), "t=0", [1300, 760]);
     assert!(start != pixels);
 }
@@ -124,7 +124,7 @@ fn a_damaged_page_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let path = page(folder.path());
     let text = std::fs::read_to_string(&path).unwrap();
-    // Base64 of the magic begins "U0lNUFJFQx".
+    // The Base64 text of the magic bytes begins with "U0lNUFJFQx".
     std::fs::write(&path, text.replacen("U0lNUFJFQx", "U0lNUFJFQy", 1).replacen("U0lNUF", "U0lNUE", 1))
         .unwrap();
     let found = drive(

@@ -33,7 +33,7 @@ fn the_page_is_made_again_from_the_records() {
     refused(path, &["report", "r"], &["study.json"]);
 }
 
-/// Texts that reach out of their plot, and pairs of axis labels that touch.
+/// Finds texts that extend beyond their plot, and pairs of axis labels that touch.
 const TEXTS: &str = r#"
     const plots = [...document.querySelectorAll("svg[role=img]")];
     const outside = [], touching = [];
@@ -69,7 +69,7 @@ fn the_page_of_a_sweep_is_whole_in_a_browser() {
     for name in ["errors", "outside", "touching"] {
         assert_eq!(found[name], serde_json::json!([]), "{name}: {found}");
     }
-    // Time and three errors on two scenes, a curve or two for most of seven solvers.
+    // Time and three errors on two scenes, with a curve or two for most of seven solvers.
     assert_eq!((found["plots"].as_u64(), found["wide"].as_i64()), (Some(2 * 4), Some(0)), "{found}");
     assert!(found["curves"].as_u64().unwrap() >= 8 * 5, "{found}");
 }
@@ -104,13 +104,14 @@ fn the_page_is_whole_in_a_browser() {
     ] {
         assert_eq!(found[name], value, "{name}: {found}");
     }
-    // One over all, three or two by scene, three profiles, two of lanes, phases, two of iterations.
+    // One plot of all scenes, two or three per scene, three profiles, two of lanes, phases, two of
+    // iterations.
     assert!(found["plots"].as_u64().unwrap() >= 25 && found["titles"].as_u64().unwrap() > 300, "{found}");
     let ratio = found["time"].as_f64().unwrap() / found["tick"].as_f64().unwrap();
     assert!((ratio - 5.0).abs() < 1e-6, "{found}");
 
     let pixels = screenshot(&browser, &page, "", [1300, 2000]);
-    // The shaded side within tolerance, the band of failures, and marks of pgs.
+    // The shaded area within tolerance, the band of failures, and markers of pgs.
     for (what, color, least) in [
         ("within", [0xea, 0xf5, 0xf0], 20_000),
         ("band", [0xf3, 0xe3, 0xdc], 3000),

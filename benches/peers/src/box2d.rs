@@ -1,4 +1,4 @@
-//! Box2D through its C interface: the one place with unsafe code.
+//! Box2D through its C interface. The only file of this program with unsafe code.
 
 #![allow(unsafe_code, reason = "a C library")]
 
@@ -8,10 +8,10 @@ use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::joints::JointKind;
 use simpulse::lab::scenes::{Geometry, Scene, SceneJoint, SceneShape};
 
-/// Most contacts of one body that are counted.
+/// Most contacts counted per body.
 const MOST_CONTACTS: usize = 100_000;
 
-/// A scene in Box2D. Friction mixes as √(µa µb) and restitution as max, as in the scene's terms.
+/// A scene in Box2D. Friction mixes as √(µa µb) and restitution as the maximum, as the scene specifies.
 pub struct Box2d {
     world: b2WorldId,
     bodies: Vec<b2BodyId>,
@@ -20,7 +20,7 @@ pub struct Box2d {
 }
 
 impl Box2d {
-    /// Errors: no world left, or a shape that Box2D refuses.
+    /// Errors: no free world slot, or a shape that Box2D rejects.
     pub fn new(scene: &Scene, contender: &Contender) -> Result<Self, String> {
         // SAFETY: definitions come from the library's own defaults and outlive the calls that
         // read them; ids are used while their world lives, and only by this thread.
@@ -30,7 +30,7 @@ impl Box2d {
             }
             b2SetLengthUnitsPerMeter(scene.length_unit as f32);
             let mut def = b2DefaultWorldDef();
-            // The defaults cross the interface whole only if both sides agree on the layout.
+            // Passing the defaults across the interface works only if both sides agree on the layout.
             if (def.gravity.y, def.contactHertz) != (-10.0, 30.0) {
                 return Err("the library's structures are laid out differently".into());
             }
@@ -91,7 +91,7 @@ unsafe fn add_shape(body: b2BodyId, shape: &SceneShape, group: i32) -> Result<()
         def.density = shape.density as f32;
         def.material.friction = shape.friction as f32;
         def.material.restitution = shape.restitution as f32;
-        // Shapes of one negative group never collide, those of one positive group always.
+        // Shapes of the same negative group never collide, those of the same positive group always do.
         def.filter.groupIndex = -(2 * group.abs() + i32::from(group < 0));
         match &shape.geometry {
             Geometry::Circle(c) => {
@@ -206,7 +206,7 @@ impl Engine for Box2d {
         let mut ends = 0;
         let mut buffer: Vec<b2ContactData> = Vec::new();
         for &id in &self.bodies {
-            // SAFETY: the buffer has room for `capacity` contacts, and the call says how many it wrote.
+            // SAFETY: the buffer has room for `capacity` contacts, and the call returns how many it wrote.
             unsafe {
                 let capacity = (b2Body_GetContactCapacity(id).max(0) as usize).min(MOST_CONTACTS);
                 buffer.clear();
@@ -214,7 +214,7 @@ impl Engine for Box2d {
                 let count = b2Body_GetContactData(id, buffer.as_mut_ptr(), capacity as i32);
                 buffer.set_len(count.max(0) as usize);
             }
-            // Each contact is listed at both bodies: a static end counts as much as a dynamic one.
+            // Each contact is listed at both bodies, so a static end counts as much as a dynamic one.
             ends += buffer.iter().map(|c| c.manifold.pointCount as usize).sum::<usize>();
         }
         ends / 2
@@ -246,7 +246,7 @@ impl Engine for Box2d {
         })
     }
 
-    /// Its clocks always run.
+    /// Box2D's clocks always run.
     fn set_timed(&mut self, _: bool) {}
 }
 

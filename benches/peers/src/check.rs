@@ -1,7 +1,7 @@
-//! The neutral check: errors from body poses in double precision, the same for every engine.
+//! The neutral check: errors computed from body poses in double precision, the same for every engine.
 //!
-//! Poses and velocities are copied into a mirror of the scene that is never stepped; overlaps
-//! come from GJK and EPA in `f64`, which no engine here uses for its contacts.
+//! Poses and velocities are copied into a mirror of the scene that is never stepped. Overlaps come from GJK
+//! and EPA in `f64`, which no engine here uses for its contacts.
 
 use crate::engine::Engine;
 use simpulse::engine::broadphase::{BroadPhase, BroadPhaseKind, Proxy};
@@ -13,23 +13,24 @@ use simpulse::engine::world::{Settings, World};
 use simpulse::lab::metrics::state::BodyState;
 use simpulse::lab::scenes::{Loaded, Truth};
 
-/// The last steps of a run that are looked at, one second.
+/// Number of steps checked at the end of a run: one second.
 pub const WINDOW: u32 = 60;
 
-/// Overlaps are measured every this many steps of the window: they change slowly.
+/// Overlaps change slowly, so they are measured only every `STRIDE` steps of the window.
 const STRIDE: u32 = 10;
 
-/// Without continuous collision a box at 10 m/s enters a wall by 0.17 m in one step, in any engine:
-/// this share of pairs may be past the middle of a body for a moment. All three engines have up to
-/// half of it in the washer at their defaults; where a pile collapses, it is some percent.
+/// Largest allowed share of pairs that overlap past the middle of a body. Without continuous collision a box
+/// at 10 m/s enters a wall by 0.17 m in one step, in any engine, so a few pairs may be that deep for a
+/// moment. At their defaults, all three engines have up to half of this share in the washer; where a pile
+/// collapses, the share is some percent.
 const MOST_LOST: f64 = 2e-3;
 
-/// How wrong a run was over its last second.
+/// Errors of a run over its last second.
 #[derive(Clone, Debug, Default)]
 pub struct Errors {
-    /// Pairs of shapes nearer than [`SPECULATIVE_DISTANCE`] at the end.
+    /// Number of shape pairs nearer than [`SPECULATIVE_DISTANCE`] at the end.
     pub pairs: usize,
-    /// Mean overlap of such pairs, open ones counted as zero (m).
+    /// Mean overlap of these pairs; open pairs count as zero (m).
     pub penetration_mean: f64,
     /// Deepest overlap (m).
     pub penetration_max: f64,
@@ -37,17 +38,17 @@ pub struct Errors {
     pub lost: f64,
     /// Root mean square of √(2 E_kin/M) (m/s).
     pub rms_velocity: f64,
-    /// Highest center of a dynamic body at the end (m).
+    /// Height of the highest dynamic body's center at the end (m).
     pub top: f64,
-    /// Farthest that a dynamic body is from where it started (m).
+    /// Largest distance of a dynamic body from its start (m).
     pub moved: f64,
-    /// Gaps of joints over the last second, root mean square and largest (m); none without joints.
+    /// Joint gaps over the last second, root mean square and largest (m); `None` without joints.
     pub gap: Option<[f64; 2]>,
-    /// What is known about the scene: the quantity, its unit, its error.
+    /// Comparison with the scene's reference value: the quantity, its unit, its error.
     pub truth: Option<(&'static str, &'static str, f64)>,
 }
 
-/// Watches one engine over its last second.
+/// Observes one engine over its last second.
 pub struct Checker {
     mirror: World,
     truth: Option<Truth>,
@@ -58,15 +59,15 @@ pub struct Checker {
     start: Vec<[f64; 2]>,
     squares: f64,
     observed: u32,
-    /// Sum of overlaps (m), pairs, and those of them past the middle of a body.
+    /// Sum of overlaps (m), number of pairs, and number of pairs past the middle of a body.
     overlaps: (f64, usize, usize),
-    /// Sum of squares of gaps (m²), their number, and the largest (m).
+    /// Sum of squares of gaps (m²), number of gaps, and the largest (m).
     gaps: (f64, usize, f64),
     errors: Errors,
 }
 
 impl Checker {
-    /// For a scene of the catalog. Errors: a scene that is not valid.
+    /// For a scene of the catalog. Errors: an invalid scene.
     pub fn new(Loaded { scene, truth, .. }: Loaded) -> Result<Self, String> {
         let settings = Settings::new(solvers::find("soft_step").map_err(|e| e.to_string())?);
         let mirror = scene.build(settings).map_err(|e| e.to_string())?;
@@ -99,7 +100,8 @@ impl Checker {
         })
     }
 
-    /// Looks at an engine `left` steps before its end. Errors: a body with a number that is none.
+    /// Observes an engine `left` steps before the end of the run. Errors: a body with a number that is not
+    /// finite.
     pub fn observe(&mut self, engine: &dyn Engine, left: u32) -> Result<(), String> {
         let bodies = &mut self.mirror.bodies;
         for i in 0..bodies.len() {
@@ -109,13 +111,14 @@ impl Checker {
                 return Err(format!("body {i} has a number that is none"));
             }
             [bodies.position_x[i], bodies.position_y[i]] = state.position;
-            // Other engines have one float for a coordinate.
+            // Other engines store a coordinate in one float.
             [bodies.position_x_lo[i], bodies.position_y_lo[i]] = [0.0; 2];
             [bodies.rotation_cos[i], bodies.rotation_sin[i]] = state.rotation;
             [bodies.velocity_x[i], bodies.velocity_y[i]] = state.velocity;
             bodies.angular_velocity[i] = state.angular_velocity;
         }
-        // Observers count from the start of the scene's own length; a shorter run ends where it does.
+        // Observers count steps from the start of the scene's full length. A shorter run is aligned at its
+        // end.
         self.mirror.step_index = self.steps - u64::from(left);
         if let Some(truth) = &mut self.truth {
             truth.observer.observe(&self.mirror);
@@ -169,7 +172,7 @@ impl Checker {
         }
     }
 
-    /// The errors of what was seen.
+    /// The errors of the observed steps.
     pub fn finish(self) -> Errors {
         let truth = self.truth.and_then(|t| Some((t.quantity, t.unit, t.observer.error()?)));
         let top = centers(&self.mirror).map(|c| c[1]).fold(f64::NEG_INFINITY, f64::max);
@@ -195,7 +198,7 @@ fn centers(world: &World) -> impl Iterator<Item = [f64; 2]> {
 }
 
 impl Errors {
-    /// Whether the run may be timed at all. Errors: what it did that its scene forbids.
+    /// Whether the run may be timed. Errors: the reason why it may not.
     pub fn verdict(&self, stands: bool) -> Result<(), String> {
         if let Some((quantity, "bodies", error)) = self.truth
             && error > 0.0
@@ -205,7 +208,7 @@ impl Errors {
         if self.lost > MOST_LOST {
             return Err(format!("{:.2} % of the pairs are past the middle of a body", 100.0 * self.lost));
         }
-        // Soft contacts let a hundred rows sag by 0.7 m; a box that left its place is farther.
+        // With soft contacts a hundred rows sag by 0.7 m. A box that left its place has moved farther.
         if stands && self.moved > 1.0 {
             return Err(format!("fell: a body moved by {:.2} m", self.moved));
         }

@@ -1,38 +1,38 @@
-//! What the race and the check ask of an engine, and the settings it runs with.
+//! The interface of an engine for the race and the check, and the settings it runs with.
 
 use simpulse::engine::broadphase::BroadPhaseKind;
 use simpulse::engine::lanes::{LaneWidth, native_width};
 
 /// A scene inside an engine: one thread, no sleeping.
 pub trait Engine {
-    /// Advances by the scene's step. Errors: the engine itself says that it diverged.
+    /// Advances by the scene's step. Errors: the engine reports that it diverged.
     fn step(&mut self) -> Result<(), String>;
 
-    /// State of a body by its number in the scene.
+    /// State of a body, by its index in the scene.
     fn state(&self, body: usize) -> State;
 
-    /// Bodies in the engine.
+    /// Number of bodies in the engine.
     fn bodies(&self) -> usize;
 
-    /// Contact points that the engine solves now.
+    /// Number of contact points that the engine currently solves.
     fn points(&self) -> usize;
 
-    /// Times of the last step (ms), by [`Stage`]; none where the engine does not tell.
+    /// Times of the last step (ms), by [`Stage`]; `None` where the engine does not report one.
     fn stages(&self) -> [Option<f64>; Stage::ALL.len()];
 
-    /// Whether clocks inside the step run, where that can be chosen.
+    /// Turns the clocks inside the step on or off, where that is possible.
     fn set_timed(&mut self, on: bool);
 }
 
-/// A body after a step, in the bits the engine holds.
+/// A body after a step, in the precision of the engine.
 pub struct State {
     /// Center of mass (m).
     pub position: [f32; 2],
     /// (cos θ, sin θ)
     pub rotation: [f32; 2],
-    /// Of the center of mass (m/s).
+    /// Velocity of the center of mass (m/s).
     pub velocity: [f32; 2],
-    /// rad/s
+    /// Angular velocity (rad/s).
     pub angular_velocity: f32,
 }
 
@@ -43,7 +43,7 @@ pub enum Stage {
     Pairs,
     /// Narrow phase and impulse matching.
     Collide,
-    /// Colors, lanes or islands. Box2D: `solverSetup`, as its colors are kept up in `Collide`.
+    /// Colors, lanes or islands. Box2D: `solverSetup`; its colors are maintained in `Collide`.
     Color,
     /// Constraint records.
     Prepare,
@@ -51,13 +51,13 @@ pub enum Stage {
     WarmStart,
     /// Sweeps with position feedback.
     Solve,
-    /// Sweeps without, and restitution.
+    /// Sweeps without position feedback, and restitution.
     Relax,
     /// Velocities and positions of bodies.
     Integrate,
-    /// The four stages above together: all that rapier tells of them.
+    /// The four stages above together: rapier reports only their sum.
     Stages,
-    /// Impulses kept, poses written back.
+    /// Storing impulses, writing poses back.
     Store,
 }
 
@@ -76,7 +76,7 @@ impl Stage {
         Stage::Store,
     ];
 
-    /// Head of its column.
+    /// Column header.
     pub fn name(self) -> &'static str {
         match self {
             Stage::Pairs => "pairs",
@@ -93,20 +93,20 @@ impl Stage {
     }
 }
 
-/// Which engine, in which build of its lanes.
+/// Which engine, and its lane width.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Maker {
     /// Eight lanes (AVX2).
     Box2d,
     /// Eight lanes.
     Rapier,
-    /// `soft_step` at a width of ours.
+    /// `soft_step` of this crate at this width, with this broad phase.
     Simpulse(LaneWidth, BroadPhaseKind),
-    /// Another solver of ours at its own parameters, at the width of the CPU.
+    /// Another solver of this crate at its own parameters, at the width of the CPU.
     Solver(&'static str),
 }
 
-/// An engine and what it is set to. Everything else is at its defaults.
+/// An engine and its settings. Everything else is at its defaults.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contender {
     /// Which engine.
@@ -115,10 +115,10 @@ pub struct Contender {
     pub substeps: u32,
     /// Stiffness of contacts (Hz); 30 is the default of all three.
     pub hertz: f32,
-    /// Whether manifolds whose bodies hardly moved are kept, the default where there is such
-    /// a thing: not in simpulse.
+    /// Whether manifolds whose bodies hardly moved are kept. This is the default of engines that support it;
+    /// simpulse does not.
     pub recycling: bool,
-    /// Whether fast bodies are stopped by what they would pass.
+    /// Whether continuous collision is on.
     pub continuous: bool,
 }
 
@@ -142,9 +142,9 @@ impl Contender {
     }
 }
 
-/// Who races: every engine at its defaults (n = 4) and, unless `quick`, at 2 and 8 substeps and
-/// with contacts twice as stiff at 8, the stiffest that Box2D's clamp allows there. Our other
-/// widths and broad phase run too, and the other engines without contact recycling.
+/// All contenders: every engine at its defaults (n = 4) and, unless `quick`, at 2 and 8 substeps, and at 8
+/// substeps with contacts twice as stiff, the stiffest that Box2D's clamp allows there. The other widths and
+/// broad phase of this crate run too, and the other engines without contact recycling.
 pub fn contenders(quick: bool) -> Vec<Contender> {
     let ours = |width| Maker::Simpulse(width, BroadPhaseKind::default());
     let mut all = Vec::new();
@@ -165,7 +165,8 @@ pub fn contenders(quick: bool) -> Vec<Contender> {
         add(ours(width), widths);
     }
     add(Maker::Simpulse(native, BroadPhaseKind::HashGrid), &default);
-    // Contact frequencies of `shim` are its own affair; the others are those engines' methods here.
+    // `shim` sets its contact frequencies itself. `box2d` and `rapier` are this crate's versions of those
+    // engines' methods.
     add(Maker::Solver("shim"), &[(14, 30.0), (8, 30.0), (3, 30.0)]);
     add(Maker::Solver("box2d"), &default);
     add(Maker::Solver("rapier"), &default);

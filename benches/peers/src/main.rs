@@ -1,18 +1,18 @@
 //! The same scenes on Box2D, rapier and simpulse, interleaved in one process:
 //! `cargo run --profile peers -p peers`.
 //!
-//! One thread, no sleeping, no continuous collision; every engine at its defaults and at other
-//! settings, its errors read from body poses by one [`check`], and its time told only if the
-//! check passed. A block of steps of one engine is followed by one of the next; ratios are of whole
-//! runs, from the first step to the last, with the longest step beside them.
+//! One thread, no sleeping, no continuous collision. Every engine runs at its defaults and at other settings.
+//! One [`check`] computes its errors from body poses, and its time is reported only if the check passed. A
+//! block of steps of one engine is followed by a block of the next. Ratios are of whole runs, from the first
+//! step to the last; the longest step is printed next to them.
 //!
-//! What differs by design. All three look 0.02 m ahead, but Box2D gives almost every pair of
-//! polygons two points, where rapier and simpulse leave out a point that is farther away: in
-//! piles it solves up to 70 % more points for as many pairs. Box2D and rapier solve friction
-//! in the relaxing sweeps only, and rapier the two points of a manifold together (block solver).
-//! Box2D and rapier keep a manifold whose bodies hardly moved (contact recycling). That is half
-//! of their speed at rest, and more: a column of soft contacts buckles under its own weight,
-//! at 30 Hz from about 14 boxes on, and without recycling their 20 boxes fall as ours do.
+//! Differences by design. All three engines look 0.02 m ahead, but Box2D gives almost every pair of polygons
+//! two points, while rapier and simpulse drop a point that is farther away. In piles Box2D therefore solves
+//! up to 70 % more points for the same number of pairs. Box2D and rapier solve friction in the relaxing
+//! sweeps only, and rapier solves the two points of a manifold together (block solver). Box2D and rapier keep
+//! a manifold whose bodies hardly moved (contact recycling). That gives half of their speed at rest, and it
+//! affects stability: a column of soft contacts buckles under its own weight, at 30 Hz from about 14 boxes
+//! on, and without recycling their columns of 20 boxes fall as those of simpulse do.
 
 mod box2d;
 mod check;
@@ -28,11 +28,11 @@ use clap::Parser;
 use simpulse::lab::torture::families::Family;
 use std::path::PathBuf;
 
-/// What is raced, for how many steps, and whether nothing in it may fall.
+/// Scenes of the race, their number of steps, and whether nothing in them may fall.
 const SCENES: &[(&str, u32, bool)] = &[
     ("large_pyramid", 500, true),
     ("many_pyramids", 200, true),
-    // 150 000 manifolds: no cache holds them.
+    // 150 000 manifolds: larger than any cache.
     ("many_pyramids:32", 120, true),
     ("circle_pile:2000", 500, false),
     ("tumbler", 750, false),
@@ -50,16 +50,16 @@ const SCENES: &[(&str, u32, bool)] = &[
 /// Steps of a `--quick` run: two seconds and the second of the check.
 const QUICK_STEPS: u32 = 180;
 
-/// Box2D, rapier and simpulse side by side: time, and error beside it.
+/// Compare Box2D, rapier and simpulse by time and by error
 #[derive(Parser)]
 struct Args {
-    /// Scenes, separated by commas; all where none is given
+    /// Scenes, separated by commas [default: all]
     #[arg(long, value_delimiter = ',')]
     scenes: Vec<String>,
     /// Steps of each scene, at least 90; the last 60 of the first repeat are not timed
     #[arg(long, value_parser = clap::value_parser!(u32).range(90..))]
     steps: Option<u32>,
-    /// How often every scene is run: a step's time is the median over the repeats
+    /// Runs of every scene; the time of a step is the median over the runs
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
     repeats: u32,
     /// Default settings only, 180 steps
@@ -68,13 +68,13 @@ struct Args {
     /// Random seed of scenes that have one
     #[arg(long)]
     seed: Option<u64>,
-    /// The campaign of `simpulse torture` instead: so many random scenes under Box2D and rapier
+    /// Run the random scenes of `simpulse torture` under Box2D and rapier instead: number of scenes
     #[arg(long, value_name = "N")]
     torture: Option<u32>,
-    /// Its families [default: all]
+    /// Families of these random scenes [default: all]
     #[arg(long, value_delimiter = ',', value_name = "FAMILY,…", requires = "torture", value_parser = simpulse::lab::torture::family)]
     families: Vec<&'static Family>,
-    /// No race: draws the peers.csv of the folder again
+    /// Run nothing; draw peers.svg again from the peers.csv in the folder
     #[arg(long)]
     draw: bool,
     /// Folder for peers.csv and peers.svg
@@ -103,7 +103,7 @@ fn run(args: &Args) -> Result<(), String> {
     let row = |name: &str| SCENES.iter().copied().find(|s| s.0 == name);
     let scenes: Vec<(&str, u32, bool)> = match &args.scenes[..] {
         [] => SCENES.to_vec(),
-        // Any other scene of the catalog may fall as it likes.
+        // Any other scene of the catalog may fall.
         names => names.iter().map(|name| row(name).unwrap_or((name, 300, false))).collect(),
     };
     let contenders = engine::contenders(args.quick);

@@ -1,4 +1,5 @@
-//! This crate's `soft_step`, the schedule that the other two have as well, and others at their own settings.
+//! This crate's `soft_step`, a schedule that the other two engines have as well, and its other solvers at
+//! their own settings.
 
 use crate::engine::{Contender, Engine, Stage, State};
 use simpulse::engine::broadphase::BroadPhaseKind;
@@ -8,11 +9,11 @@ use simpulse::engine::solvers;
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes::Scene;
 
-/// A scene in a [`World`].
+/// A scene in a [`World`] of this crate.
 pub struct Simpulse(World);
 
 impl Simpulse {
-    /// `soft_step`. Errors: a scene that is not valid.
+    /// Runs `soft_step`. Errors: an invalid scene.
     pub fn soft_step(
         scene: &Scene,
         contender: &Contender,
@@ -28,7 +29,8 @@ impl Simpulse {
         Ok(Simpulse(scene.build(settings).map_err(|e| e.to_string())?))
     }
 
-    /// Another solver at the width of the CPU and its own parameters. Errors: as above.
+    /// Runs another solver at the width of the CPU and at its own parameters. Errors: as above, or an unknown
+    /// solver.
     pub fn of(scene: &Scene, name: &str, contender: &Contender) -> Result<Self, String> {
         let solver = solvers::find(name).map_err(|e| e.to_string())?;
         let own = Settings::new(solver).exactly(native_width());

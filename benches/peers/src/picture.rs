@@ -1,7 +1,7 @@
 //! `peers.svg`: time of a step against mean overlap, a panel per scene.
 //!
-//! Both axes are logarithmic, lower left is better. What failed the check has no time and no place:
-//! it is told under its panel.
+//! Both axes are logarithmic; lower left is better. A setting that failed the check has no time and no point:
+//! it is listed below its panel.
 
 use crate::table::Row;
 use plotters::prelude::*;
@@ -14,18 +14,19 @@ use simpulse::lab::report::units::si_short;
 const COLUMNS: usize = 3;
 const PANEL: (i32, i32) = (360, 300);
 const LEGEND_HEIGHT: i32 = 62;
-/// Space left of, right of, above and below a plot.
+/// Margins left of, right of, above and below a plot.
 const LEFT: i32 = 76;
 const RIGHT: i32 = 26;
 const TOP: i32 = 34;
 const BOTTOM: i32 = 66;
-/// Letters of a line under a panel.
+/// Characters of a line below a panel.
 const LINE: usize = 56;
 
-/// Who is drawn, in the order of the legend: an engine at all its settings.
+/// Engines that are drawn, in the order of the legend, each at all its settings.
 const ENGINES: [&str; 4] = ["Box2D", "rapier", "simpulse soft_step", "simpulse shim"];
 
-/// Place in [`ENGINES`]; none for what other tables compare. `soft_step` is drawn at the width of the CPU, which comes first.
+/// Index in [`ENGINES`]; `None` for engines that are not drawn. `soft_step` is drawn at the width of the CPU,
+/// which comes first.
 fn engine(row: &Row, own: &str) -> Option<usize> {
     match row.engine.split(' ').next() {
         Some("Box2D") if row.recycling => Some(0),
@@ -35,7 +36,7 @@ fn engine(row: &Row, own: &str) -> Option<usize> {
     }
 }
 
-/// The picture as SVG text, of all rows of a race.
+/// The picture of all rows of a race, as SVG text.
 pub fn svg(rows: &[Row]) -> Result<String, String> {
     let mut text = String::new();
     draw(&rows.chunk_by(|a, b| a.scene == b.scene).collect::<Vec<_>>(), &mut text)

@@ -1,11 +1,11 @@
 //! The race: all contenders in one process, block by block, in rotated order.
 //!
-//! A block is [`BLOCK`] steps of one contender; its first step meets cold caches and is not
-//! counted, but for the first step of a run, which is as cold in any program. Contenders take turns, so
-//! that a machine that slows down slows all of them. Blocks begin elsewhere in every repeat, so that a step
-//! that one leaves out is timed by another; the time of a step is the median over the repeats, and a ratio is
-//! of whole runs: the sum over the steps that both were timed in. A spike is in it, and the longest step stands
-//! beside it. The last second of the first run is not timed: it belongs to the check.
+//! A block is [`BLOCK`] steps of one contender. Its first step finds cold caches and is not counted, except
+//! the first step of a run, which is as cold in any program. Contenders take turns, so a slow spell of the
+//! machine affects all of them alike. Blocks begin at other steps in every repeat, so a step that is skipped
+//! in one repeat is timed in another. The time of a step is the median over the repeats. A ratio is of whole
+//! runs: the sum over the steps that were timed for both contenders. It includes spikes, and the longest step
+//! is printed next to it. The last second of the first run is not timed: it is used for the check.
 
 use crate::box2d::Box2d;
 use crate::check::{Checker, Errors, WINDOW};
@@ -18,7 +18,7 @@ use simpulse::lab::scenes::{self, Scene};
 use std::ops::Range;
 use std::time::Instant;
 
-/// The scene in the contender's engine. Errors: what the engine cannot hold.
+/// Builds the scene in the contender's engine. Errors: a part of the scene that the engine does not support.
 pub fn build(contender: &Contender, scene: &Scene) -> Result<Box<dyn Engine>, String> {
     Ok(match contender.maker {
         Maker::Box2d => Box::new(Box2d::new(scene, contender)?),
@@ -31,13 +31,13 @@ pub fn build(contender: &Contender, scene: &Scene) -> Result<Box<dyn Engine>, St
 /// Steps of a block.
 const BLOCK: u32 = 10;
 
-/// The blocks of a repeat begin so many steps before those of the last one.
+/// Blocks of a repeat begin this many steps before those of the previous repeat.
 const SHIFT: u32 = 3;
 
-/// In every fourth round the clocks inside the steps run, and whole steps are not counted.
+/// In every fourth round the clocks inside the steps run, and whole steps are not timed.
 const CLOCKED_ROUND: u32 = 4;
 
-/// A block is left out if the thread waited for a processor for more than this share of it (1).
+/// A block is dropped if the thread waited for a processor for more than this fraction of it (1).
 const WAITED: f64 = 0.01;
 
 /// Times of the steps of a run (ms).
@@ -47,12 +47,12 @@ pub struct Steps {
     pub mean: f64,
     /// Quartiles.
     pub quartiles: Quartiles,
-    /// The longest.
+    /// Longest step.
     pub longest: f64,
 }
 
 impl Steps {
-    /// Of each step; not a number where one was not timed.
+    /// From the time of each step; NaN where a step was not timed.
     fn of(steps: &[f64]) -> Option<Self> {
         let timed: Vec<f64> = steps.iter().copied().filter(|ms| ms.is_finite()).collect();
         let (mean, longest) =
@@ -61,14 +61,14 @@ impl Steps {
     }
 }
 
-/// One whole run in times another, by the steps that both were timed in.
+/// Time of one whole run relative to another, over the steps that were timed in both.
 fn whole(one: &[f64], other: &[f64]) -> Option<f64> {
     let both = one.iter().zip(other).filter(|(a, b)| a.is_finite() && b.is_finite());
     let [a, b] = both.fold([0.0; 2], |[x, y], (a, b)| [x + a, y + b]);
     (b > 0.0).then(|| a / b)
 }
 
-/// The steps of a repeat in blocks.
+/// Splits the steps of a repeat into blocks.
 fn blocks(steps: u32, repeat: u32) -> impl Iterator<Item = Range<u32>> {
     let first = BLOCK - repeat * SHIFT % BLOCK;
     let starts = std::iter::once(0).chain((0..).map(move |i| first + i * BLOCK));
@@ -80,16 +80,16 @@ fn blocks(steps: u32, repeat: u32) -> impl Iterator<Item = Range<u32>> {
 /// Quartiles of a sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Quartiles {
-    /// A quarter is below.
+    /// First quartile.
     pub low: f64,
-    /// Half is below.
+    /// Median.
     pub median: f64,
-    /// A quarter is above.
+    /// Third quartile.
     pub high: f64,
 }
 
 impl Quartiles {
-    /// Of a sample that has a value.
+    /// Quartiles of a sample; `None` if it is empty.
     pub fn of(mut sample: Vec<f64>) -> Option<Self> {
         sample.sort_by(f64::total_cmp);
         let at = |share: f64| sample.get((share * (sample.len() - 1) as f64).round() as usize).copied();
@@ -100,39 +100,39 @@ impl Quartiles {
     }
 }
 
-/// What one contender did in one scene.
+/// Result of one contender in one scene.
 pub struct Outcome {
-    /// Who.
+    /// The contender.
     pub contender: Contender,
     /// Bodies and contact points in the engine at the end.
     pub counts: (usize, usize),
-    /// Its errors, unless it did not come to its end.
+    /// Errors of the run, unless it did not finish.
     pub errors: Option<Errors>,
-    /// What failed, if the check did. Then there are no times.
+    /// Why the check failed. If it did, there are no times.
     pub failed: Option<String>,
-    /// ms per step.
+    /// Times of the steps (ms).
     pub step: Option<Steps>,
-    /// Share of the time in which the thread waited for a processor (1); left out of all times.
+    /// Fraction of the time in which the thread waited for a processor (1); not part of any other time.
     pub waited: f64,
-    /// ms per step and stage with the clocks on, and of the whole step.
+    /// Times of the stages and of the whole step, with the clocks on (ms).
     pub stages: Option<Breakdown>,
-    /// Time of the whole run against `soft_step` at the width of the CPU and as many substeps.
+    /// Time of the whole run relative to `soft_step` at the width of the CPU and with as many substeps.
     pub ratio: Option<f64>,
-    /// Block by block the same of warm start, solve, relax and integrate alone.
+    /// The same ratio block by block, for warm start, solve, relax and integrate alone.
     pub stages_ratio: Option<Quartiles>,
 }
 
-/// Times of steps taken apart (ms), all of the same steps, so that they add up.
+/// Times of a step by stage (ms). All are of the same steps, so that they add up.
 #[derive(Clone, Copy, Debug)]
 pub struct Breakdown {
-    /// By [`Stage`]; none where the engine does not tell.
+    /// By [`Stage`]; `None` where the engine does not report it.
     pub stages: [Option<f64>; Stage::ALL.len()],
-    /// Of the whole step.
+    /// Time of the whole step.
     pub step: f64,
 }
 
 impl Breakdown {
-    /// Mean of a sample; none of an empty one.
+    /// Mean of a sample; `None` if it is empty.
     fn mean(sample: &[Self]) -> Option<Self> {
         let count = sample.len() as f64;
         let mean =
@@ -141,7 +141,7 @@ impl Breakdown {
         Some(Breakdown { stages, step: mean(&|b| Some(b.step)).filter(|_| count > 0.0)? })
     }
 
-    /// Mean of the faster half of a block: what interrupted a step is no stage of it.
+    /// Mean of the faster half of a block, which excludes interrupted steps.
     fn of_block(mut sample: Vec<Self>) -> Option<Self> {
         sample.sort_by(|a, b| a.step.total_cmp(&b.step));
         Self::mean(&sample[..sample.len().div_ceil(2)])
@@ -153,16 +153,17 @@ struct Runner {
     contender: Contender,
     engine: Box<dyn Engine>,
     failed: Option<String>,
-    /// ms, `[repeat][step]`; not a number where a step was not timed.
+    /// Times (ms), `[repeat][step]`; NaN where a step was not timed.
     steps: Vec<Vec<f64>>,
-    /// Time in which the thread waited, and in which blocks ran (ms).
+    /// Time in which the thread waited, and time in which blocks ran (ms).
     waited_and_ran: [f64; 2],
-    /// Of each clocked block.
+    /// One per clocked block.
     clocked: Vec<Breakdown>,
 }
 
-/// Runs a scene of the catalog for `steps` steps, `repeats` times, with `seed` where it has one; `stands` tells the check that
-/// nothing may fall. Errors: an unknown scene, or one that an engine cannot hold.
+/// Runs a scene of the catalog or a `.json` file for `steps` steps, `repeats` times, with `seed` if it has
+/// one. With `stands`, the check fails if anything falls. Errors: an unknown scene, or one that an engine
+/// does not support.
 pub fn race(
     name: &str,
     seed: Option<u64>,
@@ -209,7 +210,7 @@ pub fn race(
                 runners[place].block(block.clone(), round + repeat);
             }
         }
-        // Runs repeat to the bit, so one check is enough; it comes before any time is looked at.
+        // Runs are deterministic, so one check is enough. It comes before any time is used.
         if repeat == 0 {
             for runner in &mut runners {
                 errors.push(runner.check(Checker::new(load()?)?, steps - rounds * BLOCK, stands));
@@ -246,14 +247,14 @@ pub fn race(
     Ok(errors.into_iter().zip(counts).enumerate().map(outcome).collect())
 }
 
-/// `soft_step` at the width of the CPU and the same settings, without options.
+/// Index of `soft_step` at the width of the CPU and at the same settings, with default options.
 fn rival(contenders: &[Contender], of: &Contender) -> Option<usize> {
     let maker = Maker::Simpulse(native_width(), Default::default());
     contenders.iter().position(|c| *c == Contender { maker, recycling: true, ..*of })
 }
 
 impl Runner {
-    /// Of each step, the median over the repeats; not a number where none timed it.
+    /// Median over the repeats for each step; NaN where no repeat timed it.
     fn medians(&self) -> Vec<f64> {
         let count = self.steps.first().map_or(0, Vec::len);
         let repeats =
@@ -261,7 +262,7 @@ impl Runner {
         (0..count).map(|step| Quartiles::of(repeats(step)).map_or(f64::NAN, |q| q.median)).collect()
     }
 
-    /// The steps of a block of the last repeat.
+    /// Runs the steps of a block of the last repeat.
     fn block(&mut self, steps: Range<u32>, round: u32) {
         if self.failed.is_some() {
             return;
@@ -295,7 +296,8 @@ impl Runner {
         if waits > WAITED * ran {
             return;
         }
-        // Another contender ran before: but for the first step of the run, this one met its caches.
+        // Another contender ran before, so the first step found cold caches. The first step of the run is
+        // kept.
         if steps.start > 0 {
             times[0] = f64::NAN;
         }
@@ -304,8 +306,7 @@ impl Runner {
         }
     }
 
-    /// The last `left` steps, those of the last second under the checker's eyes; its errors,
-    /// unless the engine diverges.
+    /// Runs the last `left` steps and checks the last second. Returns the errors, unless the engine diverges.
     fn check(&mut self, mut checker: Checker, left: u32, stands: bool) -> Option<Errors> {
         if self.failed.is_some() {
             return None;

@@ -6,15 +6,15 @@ use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::joints::JointKind;
 use simpulse::lab::scenes::{Geometry, Scene, SceneJoint, SceneShape};
 
-/// A scene in rapier. Its default mixing is by averages; here friction mixes by the geometric
-/// mean and restitution by the maximum, as in the scene's terms.
+/// A scene in rapier. Its default is to mix by averages; here friction mixes by the geometric mean and
+/// restitution by the maximum, as the scene specifies.
 pub struct Rapier {
     world: PhysicsWorld,
     bodies: Vec<RigidBodyHandle>,
 }
 
 impl Rapier {
-    /// Errors: a shape or a joint that it refuses.
+    /// Errors: a shape or a joint that rapier does not support.
     pub fn new(scene: &Scene, contender: &Contender) -> Result<Self, String> {
         let mut world = PhysicsWorld { gravity: vector(scene.gravity), ..PhysicsWorld::default() };
         let p = &mut world.integration_parameters;
@@ -59,7 +59,7 @@ impl Rapier {
     }
 }
 
-/// Rate at which a motor nears its speed (1/s): at once, within its greatest force.
+/// Rate at which a motor approaches its target speed (1/s): immediately, within its maximum force.
 const MOTOR: f32 = 1e6;
 
 fn data_of(joint: &SceneJoint) -> Result<GenericJoint, String> {
@@ -72,7 +72,8 @@ fn data_of(joint: &SceneJoint) -> Result<GenericJoint, String> {
             if let Some([lower, upper]) = of.limits {
                 builder = builder.limits([lower as f32, upper as f32]);
             }
-            // It has one motor: a spring takes the place of a second one, which here is friction of the hinge.
+            // rapier's joint has one motor. It is used for the spring if there is one, otherwise for a motor
+            // or for friction of the hinge.
             if let Some(spring) = of.spring {
                 let omega = std::f64::consts::TAU * spring.hertz;
                 let gains = [omega * omega, 2.0 * spring.damping_ratio * omega].map(|gain| gain as f32);
@@ -93,8 +94,8 @@ fn data_of(joint: &SceneJoint) -> Result<GenericJoint, String> {
     }
 }
 
-/// Bodies of the same non-zero group do not collide: each group is a bit that filters itself out. From the thirty-first on, groups
-/// share bits; in scenes with so many they are in other places.
+/// Bodies of the same non-zero group do not collide: each group is a bit that filters itself out. From the
+/// thirty-first group on, groups share bits; in such scenes, groups that share a bit are far apart.
 fn groups_of(group: i32, known: &mut Vec<i32>) -> InteractionGroups {
     if group == 0 {
         return InteractionGroups::default();
@@ -103,7 +104,7 @@ fn groups_of(group: i32, known: &mut Vec<i32>) -> InteractionGroups {
         known.push(group);
         known.len() - 1
     });
-    // Bit 0 is that of bodies without a group.
+    // Bit 0 belongs to bodies without a group.
     let own = Group::from_bits_truncate(1 << (index % 31 + 1));
     InteractionGroups::new(own, Group::ALL.difference(own), InteractionTestMode::And)
 }
@@ -185,6 +186,6 @@ impl Engine for Rapier {
         })
     }
 
-    /// Chosen when it is compiled.
+    /// Clocks are chosen when rapier is compiled.
     fn set_timed(&mut self, _: bool) {}
 }

@@ -1,4 +1,4 @@
-//! Tables for people, rows for programs.
+//! Human-readable tables, and rows of `peers.csv`.
 
 use crate::engine::{Maker, Stage};
 use crate::race::{Outcome, Quartiles, Steps};
@@ -7,11 +7,12 @@ use serde::{Deserialize, Serialize};
 
 const NONE: &str = "–";
 
-/// A mean this much above Box2D's is still called no larger: chaotic scenes scatter so.
+/// A mean up to this factor above Box2D's counts as no larger, because chaotic scenes scatter by that much.
 const ALLOWED: f64 = 1.1;
 
-/// Times and errors, one row per contender. `ms/step` is the mean over the run and `× simpulse` of whole runs;
-/// `stages ×` is of blocks, with quartiles. `lost` pairs overlap past the middle of a body.
+/// Times and errors, one row per contender. `ms/step` is the mean over the run, and `× simpulse` is the ratio
+/// of whole runs. `stages ×` is the ratio of blocks, with quartiles. `lost` pairs overlap past the middle of
+/// a body.
 pub fn comparison(outcomes: &[Outcome]) -> Table {
     let mut table = head(&[
         "engine",
@@ -68,7 +69,7 @@ pub fn comparison(outcomes: &[Outcome]) -> Table {
     table
 }
 
-/// ms per step by stage at four substeps.
+/// Time by stage at four substeps (ms per step).
 pub fn stages(outcomes: &[Outcome]) -> Table {
     let names: Vec<&str> = Stage::ALL.iter().map(|s| s.name()).collect();
     let mut table = head(&[&["engine"], &names[..], &["rest", "step"]].concat());
@@ -77,7 +78,7 @@ pub fn stages(outcomes: &[Outcome]) -> Table {
         let anew = if o.contender.recycling { "" } else { ", no recycling" };
         let mut row = vec![o.contender.name() + anew];
         row.extend(b.stages.map(|ms| ms.map_or(NONE.into(), significant)));
-        // The stages add up to `Stages`, which is itself among them.
+        // The stages from warm start to integrate add up to `Stages`, which is in the list itself.
         let apart = [Stage::WarmStart, Stage::Solve, Stage::Relax, Stage::Integrate];
         let counted = Stage::ALL.iter().filter(|s| !apart.contains(s));
         let told: f64 = counted.filter_map(|&s| b.stages[s as usize]).sum();
@@ -89,8 +90,8 @@ pub fn stages(outcomes: &[Outcome]) -> Table {
     table
 }
 
-/// The fastest setting of every engine whose errors are no larger than those of Box2D at its
-/// defaults: the mean overlap, the gap of joints, and where things rest also the velocity that is left.
+/// The fastest setting of every engine whose errors are no larger than those of Box2D at its defaults: the
+/// mean overlap, the joint gap and, in scenes that stand, the residual velocity.
 pub fn equal_errors(outcomes: &[Outcome], stands: bool) -> Vec<String> {
     let default = |o: &&Outcome| {
         let c = &o.contender;
@@ -123,8 +124,9 @@ pub fn equal_errors(outcomes: &[Outcome], stands: bool) -> Vec<String> {
     lines
 }
 
-/// One scene in the summary of all, in Markdown: defaults (n = 4) of all three engines, ours at
-/// the width of the CPU; ratios of whole runs, longest steps, and errors of the last second.
+/// One scene in the summary of all scenes, in Markdown. All three engines are at their defaults (n = 4),
+/// simpulse at the width of the CPU. Columns: ratios of whole runs, longest steps, and errors of the last
+/// second.
 pub fn summary_line(scene: &str, outcomes: &[Outcome]) -> String {
     let of = |family: &str| {
         outcomes.iter().find(|o| {
@@ -157,7 +159,7 @@ pub fn summary_line(scene: &str, outcomes: &[Outcome]) -> String {
     format!("| {} |", cells.join(" | "))
 }
 
-/// Head of the summary.
+/// Header of the summary.
 pub const SUMMARY: &str = "\
 | scene | simpulse ms | Box2D × | its stages × | rapier × | longest step ms s / B / r | mean overlap mm s / B / r | max overlap mm s / B / r | rms velocity mm/s s / B / r | gap of joints mm s / B / r |
 |---|---|---|---|---|---|---|---|---|---|";
@@ -208,7 +210,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// Everything of an outcome; no times where the check failed.
+    /// All values of an outcome; no times if the check failed.
     pub fn new(scene: &str, o: &Outcome) -> Self {
         let e = o.errors.as_ref();
         let [pairs, collide, color, prepare, warm_start, solve, relax, integrate, stages, store] =
@@ -263,12 +265,12 @@ fn head(names: &[&str]) -> Table {
     table
 }
 
-/// A time of a step (ms).
+/// A time of a step (ms), as text.
 fn ms(o: &Outcome, of: fn(&Steps) -> f64) -> String {
     o.step.as_ref().map_or(NONE.into(), |steps| significant(of(steps)))
 }
 
-/// Three digits; of what there is none, a dash.
+/// Three digits; a dash for NaN.
 fn significant(x: f64) -> String {
     if x.is_nan() {
         return NONE.into();

@@ -1,11 +1,11 @@
-//! The campaign of `simpulse torture` under the other engines: the same scenes, the same judge.
+//! The random scenes of `simpulse torture` under the other engines, with the same checks.
 
 use crate::engine::{Contender, Engine, Maker};
 use crate::race::build;
 use simpulse::lab::torture::families::{FAMILIES, Family};
 use simpulse::lab::torture::{self, Campaign, CaseOutcome, TortureCase, TortureRow, table};
 
-/// Another engine, as the judge sees it.
+/// Another engine, behind the interface of the checks.
 struct Judged(Box<dyn Engine>);
 
 impl torture::Engine for Judged {
@@ -19,7 +19,7 @@ impl torture::Engine for Judged {
     }
 }
 
-/// Every engine at its defaults, and with the other choice of continuous collision.
+/// Every engine at its defaults, and with the opposite setting of continuous collision.
 fn engines() -> Vec<(&'static str, Contender)> {
     let own = |maker, continuous| Contender { maker, substeps: 4, hertz: 30.0, recycling: true, continuous };
     vec![
@@ -30,15 +30,15 @@ fn engines() -> Vec<(&'static str, Contender)> {
     ]
 }
 
-/// One case in one engine. Errors: what it cannot hold.
+/// Runs one case in one engine. Errors: a part of the scene that the engine does not support.
 fn one(case: &TortureCase, contender: &Contender) -> Result<CaseOutcome, String> {
     let contender = Contender { substeps: case.substeps.unwrap_or(contender.substeps), ..*contender };
     let mut engine = Judged(build(&contender, &case.scene)?);
     torture::run(case, &mut engine).map_err(|e| e.to_string())
 }
 
-/// Prints the table by family. One thread: Box2D makes its worlds in a list without a lock. Errors: none that an engine
-/// makes; what it refuses is counted.
+/// Prints the table by family. Runs on one thread, because Box2D keeps its worlds in a list without a lock.
+/// Errors: none from an engine; scenes that it does not support are counted.
 pub fn run(seed: u64, mut families: Vec<&'static Family>, scenes: u32) -> Result<(), String> {
     let (engines, mut rows, mut refused) = (engines(), Vec::new(), 0);
     if families.is_empty() {

@@ -6,10 +6,10 @@ use crate::engine::params::{DEFAULT_DENSITY, DEFAULT_FRICTION};
 use crate::engine::shapes::{MassProperties, Shape, combine};
 use glam::Vec2;
 
-/// Greatest friction coefficient (1), so that the product of two is finite in `f32`.
+/// Maximum friction coefficient (1), so that the product of two is finite in `f32`.
 pub const MAX_FRICTION: f64 = 1e9;
 
-/// A shape with its surface.
+/// A shape and its surface properties.
 ///
 /// ```
 /// # use simpulse_engine as simpulse;
@@ -26,7 +26,7 @@ pub const MAX_FRICTION: f64 = 1e9;
 pub struct ShapeDef {
     /// Geometry in the frame of the body's origin (m).
     pub shape: Shape,
-    /// kg/m², > 0
+    /// Density (kg/m²), > 0.
     pub density: f64,
     /// Coulomb coefficient, ≥ 0; two surfaces mix as √(µa µb).
     pub friction: f64,
@@ -48,27 +48,27 @@ pub struct ShapeDef {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyDef {
-    /// How it moves.
+    /// How the body moves.
     pub kind: BodyKind,
     /// Origin of the body's frame (m).
     pub position: [f64; 2],
-    /// rad
+    /// Initial angle (rad).
     pub angle: f64,
     /// Velocity of the center of mass (m/s).
     pub velocity: [f64; 2],
-    /// rad/s
+    /// Angular velocity (rad/s).
     pub angular_velocity: f64,
     /// Factor on gravity (1).
     pub gravity_scale: f64,
-    /// 1/s
+    /// Linear damping (1/s).
     pub linear_damping: f64,
-    /// 1/s
+    /// Angular damping (1/s).
     pub angular_damping: f64,
     /// Bodies of the same non-zero group do not collide.
     pub group: i32,
-    /// With continuous collision, dynamic bodies stop it as well, see [`crate::engine::continuous`].
+    /// Whether dynamic bodies also stop it in continuous collision, see [`crate::engine::continuous`].
     pub bullet: bool,
-    /// Shapes that move as one.
+    /// Shapes, rigidly connected.
     pub shapes: Vec<ShapeDef>,
 }
 
@@ -78,12 +78,12 @@ impl ShapeDef {
         ShapeDef { shape, density: DEFAULT_DENSITY, friction: DEFAULT_FRICTION, restitution: 0.0 }
     }
 
-    /// A rectangle about the origin of the body. Half extents in m; errors: as [`Shape::rectangle`].
+    /// A rectangle centered at the origin of the body. Half extents in m; errors: as [`Shape::rectangle`].
     pub fn rectangle(half_width: f32, half_height: f32) -> Result<Self, Error> {
         Shape::rectangle("rectangle", Vec2::new(half_width, half_height), Vec2::ZERO, 0.0, 0.0).map(Self::new)
     }
 
-    /// A disc about the origin of the body. Radius in m; errors: as [`Shape::circle`].
+    /// A disc centered at the origin of the body. Radius in m; errors: as [`Shape::circle`].
     pub fn circle(radius: f32) -> Result<Self, Error> {
         Shape::circle("circle", Vec2::ZERO, radius).map(Self::new)
     }
@@ -93,7 +93,7 @@ impl ShapeDef {
         Shape::capsule("capsule", a.into(), b.into(), radius).map(Self::new)
     }
 
-    /// A line from a to b (m) without mass, for static bodies. Errors: as [`Shape::segment`].
+    /// A massless line from a to b (m), for static bodies. Errors: as [`Shape::segment`].
     pub fn segment(a: [f32; 2], b: [f32; 2]) -> Result<Self, Error> {
         Shape::segment("segment", a.into(), b.into()).map(Self::new)
     }
@@ -104,31 +104,31 @@ impl ShapeDef {
         Shape::polygon("polygon", &vertices, 0.0).map(Self::new)
     }
 
-    /// Moved by `offset` (m) in the frame of the body.
+    /// Moves the shape by `offset` (m) in the frame of the body.
     pub fn at(self, offset: [f32; 2]) -> Self {
         ShapeDef { shape: self.shape.translated(offset.into()), ..self }
     }
 
-    /// With this density (kg/m²).
+    /// Sets the density (kg/m²).
     pub fn with_density(self, density: f64) -> Self {
         ShapeDef { density, ..self }
     }
 
-    /// With this Coulomb coefficient.
+    /// Sets the Coulomb coefficient.
     pub fn with_friction(self, friction: f64) -> Self {
         ShapeDef { friction, ..self }
     }
 
-    /// With this restitution.
+    /// Sets the restitution.
     pub fn with_restitution(self, restitution: f64) -> Self {
         ShapeDef { restitution, ..self }
     }
 
-    /// Errors: a density ≤ 0, a negative friction or one above [`MAX_FRICTION`], a restitution outside [0, 1], anything
-    /// that is not finite in `f32`.
+    /// Checks the values. Errors: a density ≤ 0, a negative friction or one above [`MAX_FRICTION`], a
+    /// restitution outside [0, 1], and values that are not finite in `f32`.
     pub fn check(&self) -> Result<(), Error> {
         finite("density", self.density)?;
-        // Too small for 32 bits is zero.
+        // A density too small for 32 bits becomes zero.
         if self.density as f32 <= 0.0 {
             return Err(Error::invalid("density", format!("must be positive, is {:?}", self.density)));
         }
@@ -164,7 +164,7 @@ impl BodyDef {
         }
     }
 
-    /// A body that forces and contacts move, at rest at `position` (m), without shapes.
+    /// A body moved by forces and contacts, at rest at `position` (m), without shapes.
     pub fn dynamic(position: [f64; 2]) -> Self {
         BodyDef::new(BodyKind::Dynamic, position, Vec::new())
     }
@@ -200,17 +200,17 @@ impl BodyDef {
         self
     }
 
-    /// Turned to this angle (rad).
+    /// Sets the angle (rad).
     pub fn with_angle(self, angle: f64) -> Self {
         BodyDef { angle, ..self }
     }
 
-    /// With this velocity of the center of mass (m/s).
+    /// Sets the velocity of the center of mass (m/s).
     pub fn with_velocity(self, velocity: [f64; 2]) -> Self {
         BodyDef { velocity, ..self }
     }
 
-    /// With this spin (rad/s).
+    /// Sets the angular velocity (rad/s).
     pub fn with_angular_velocity(self, angular_velocity: f64) -> Self {
         BodyDef { angular_velocity, ..self }
     }
@@ -220,10 +220,11 @@ impl BodyDef {
         combine(&self.shapes.iter().map(|s| s.shape.mass(s.density)).collect::<Vec<_>>())
     }
 
-    /// Whether a world takes this body; returns its mass properties.
+    /// Checks whether a world accepts this body; returns its mass properties.
     ///
-    /// Errors, naming place and value: a number that is not finite in `f32`; negative damping; what [`ShapeDef::check`]
-    /// refuses; a dynamic body without shapes, or whose mass or inertia is zero or not finite.
+    /// Errors, with field and value: a number that is not finite in `f32`; negative damping; a shape rejected
+    /// by [`ShapeDef::check`]; a dynamic body without shapes, or with a mass or inertia that is zero or not
+    /// finite.
     pub fn check(&self) -> Result<MassProperties, Error> {
         finite_pair("position", self.position)?;
         finite("angle", self.angle)?;
@@ -241,7 +242,7 @@ impl BodyDef {
                 return Err(Error::invalid("shapes", "a dynamic body needs at least one shape, has 0"));
             }
             for (name, value) in [("mass", mass.mass as f32), ("inertia", mass.inertia as f32)] {
-                // The reciprocal is what the solver holds, so it must be a number too.
+                // The solver stores the reciprocal, so it must be a normal number too.
                 if !(value.is_normal() && value.recip().is_normal()) {
                     let message =
                         format!("the {name} of a dynamic body must be positive and finite, is {value}");

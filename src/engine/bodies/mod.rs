@@ -1,5 +1,5 @@
-//! Bodies: how they are defined ([`BodyDef`], [`ShapeDef`]), how a caller names them ([`BodyHandle`]), and their
-//! state as structure-of-arrays, castable to lanes ([`Bodies`]).
+//! Bodies: their definitions ([`BodyDef`], [`ShapeDef`]), their handles ([`BodyHandle`]), and their state as
+//! a structure of arrays, castable to lanes ([`Bodies`]).
 
 use crate::engine::lanes::LaneVec;
 use crate::engine::shapes::{MassProperties, Pose};
@@ -24,8 +24,9 @@ pub enum BodyKind {
 
 /// Identifies a body of a [`World`](crate::engine::world::World).
 ///
-/// A handle stays valid until its body is removed, whatever else is added or removed. The index of a removed body may
-/// be reused; the generation distinguishes the two, so an old handle gives an error and never another body.
+/// A handle stays valid until its body is removed, whatever else is added or removed. The index of a removed
+/// body may be reused. The generation distinguishes the two, so an old handle gives an error and never refers
+/// to another body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BodyHandle {
@@ -34,7 +35,7 @@ pub struct BodyHandle {
 }
 
 impl BodyHandle {
-    /// Place of the body in the arrays of [`Bodies`].
+    /// Index of the body in the arrays of [`Bodies`].
     pub fn index(self) -> usize {
         self.index as usize
     }
@@ -43,40 +44,40 @@ impl BodyHandle {
 /// State of all bodies, one array per quantity, `[len]` each.
 #[derive(Clone, Debug, Default)]
 pub struct Bodies {
-    /// Center of mass (m).
+    /// Center of mass, x (m).
     pub position_x: LaneVec,
-    /// Center of mass (m).
+    /// Center of mass, y (m).
     pub position_y: LaneVec,
-    /// Low part of the position (m): x is `position_x + position_x_lo`. See [`Bodies::advance`].
+    /// Low part of the position, x (m): x is `position_x + position_x_lo`. See [`Bodies::advance`].
     pub position_x_lo: LaneVec,
-    /// Low part of the position (m).
+    /// Low part of the position, y (m).
     pub position_y_lo: LaneVec,
     /// cos θ
     pub rotation_cos: LaneVec,
     /// sin θ
     pub rotation_sin: LaneVec,
-    /// m/s
+    /// Velocity of the center of mass, x (m/s).
     pub velocity_x: LaneVec,
-    /// m/s
+    /// Velocity of the center of mass, y (m/s).
     pub velocity_y: LaneVec,
-    /// rad/s
+    /// Angular velocity (rad/s).
     pub angular_velocity: LaneVec,
-    /// 1/kg, zero for static and kinematic bodies
+    /// Inverse mass (1/kg), zero for static and kinematic bodies.
     pub inv_mass: LaneVec,
-    /// 1/(kg·m²), zero for static and kinematic bodies
+    /// Inverse inertia (1/(kg·m²)), zero for static and kinematic bodies.
     pub inv_inertia: LaneVec,
-    /// Force applied in every step until it is changed (N). For one step alone:
+    /// Force applied in every step until it is changed, x (N). For a single step:
     /// [`World::apply_force`](crate::engine::world::World::apply_force).
     pub force_x: LaneVec,
-    /// Force applied in every step until it is changed (N).
+    /// Force applied in every step until it is changed, y (N).
     pub force_y: LaneVec,
     /// Torque applied in every step until it is changed (N·m).
     pub torque: LaneVec,
     /// Factor on gravity (1).
     pub gravity_scale: LaneVec,
-    /// 1/s
+    /// Linear damping (1/s).
     pub linear_damping: LaneVec,
-    /// 1/s
+    /// Angular damping (1/s).
     pub angular_damping: LaneVec,
     /// From the body's origin to its center of mass, body axes (m).
     pub local_center: Vec<Vec2>,
@@ -84,9 +85,9 @@ pub struct Bodies {
     pub kind: Vec<BodyKind>,
     /// Collision group of each body; 0 is none.
     pub group: Vec<i32>,
-    /// Whether dynamic bodies stop it under continuous collision.
+    /// Whether dynamic bodies also stop it in continuous collision.
     pub bullet: Vec<bool>,
-    /// Whether a body is made of discs about its center of mass: turning it moves no contact.
+    /// Whether a body consists of discs about its center of mass, so that rotating it moves no contact.
     pub round: Vec<bool>,
 }
 
@@ -96,7 +97,7 @@ impl Bodies {
         self.kind.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no bodies.
     pub fn is_empty(&self) -> bool {
         self.kind.is_empty()
     }
@@ -116,12 +117,12 @@ impl Bodies {
         i
     }
 
-    /// Replaces body `i` with another one.
+    /// Replaces body `i`.
     pub(crate) fn set(&mut self, i: usize, def: &BodyDef, mass: &MassProperties) {
         let [cx, cy] = mass.center;
         self.local_center[i] = Vec2::new(cx as f32, cy as f32);
         self.place(i, def.position, def.angle, mass.center);
-        // A static body has no velocity, whatever its definition says.
+        // A static body has no velocity, whatever its definition.
         let moves = if def.kind == BodyKind::Static { 0.0 } else { 1.0 };
         self.velocity_x[i] = (moves * def.velocity[0]) as f32;
         self.velocity_y[i] = (moves * def.velocity[1]) as f32;
@@ -137,8 +138,8 @@ impl Bodies {
         self.bullet[i] = def.bullet;
     }
 
-    /// Moves body `i`: the origin of its frame to `origin` (m), its angle to `angle` (rad). `center` is its center of mass
-    /// in its frame (m).
+    /// Places body `i`: moves the origin of its frame to `origin` (m) and its angle to `angle` (rad).
+    /// `center` is its center of mass in its frame (m).
     pub(crate) fn place(&mut self, i: usize, origin: [f64; 2], angle: f64, center: [f64; 2]) {
         let ((sin, cos), [cx, cy]) = (angle.sin_cos(), center);
         let x = origin[0] + cos * cx - sin * cy;
@@ -176,7 +177,7 @@ impl Bodies {
         ]
     }
 
-    /// The same, to be written.
+    /// As [`Self::arrays`], mutable.
     pub(crate) fn arrays_mut(&mut self) -> [&mut LaneVec; 17] {
         [
             &mut self.position_x,
@@ -207,8 +208,8 @@ impl Bodies {
         }
     }
 
-    /// Poses of the centers of mass of bodies `a` and `b`, from a's position: the difference of the positions
-    /// includes their low parts, so the result is as accurate far from the origin as near it.
+    /// Poses of the centers of mass of bodies `a` and `b`, relative to a's position. The difference of the
+    /// positions includes their low parts, so the result is as accurate far from the origin as near it.
     #[inline]
     pub fn relative_poses(&self, a: usize, b: usize) -> [Pose; 2] {
         let x = (self.position_x[b] - self.position_x[a]) + (self.position_x_lo[b] - self.position_x_lo[a]);
@@ -222,9 +223,9 @@ impl Bodies {
 
     /// Moves body `i` by `delta` (m).
     ///
-    /// A position of f32 alone stands still once a step's motion is below half its last digit: 30 nm at 1 m, 4 mm at
-    /// 100 km. So the rounding error of the sum is kept in the low part, by Knuth's two-sum, which is exact for any
-    /// magnitudes.
+    /// An f32 position alone would not change if a step's motion is below half its last digit: 30 nm at 1 m,
+    /// 4 mm at 100 km. So the rounding error of the sum is kept in the low part, by Knuth's two-sum, which is
+    /// exact for any magnitudes.
     #[inline]
     pub fn advance(&mut self, i: usize, delta: Vec2) {
         let add = |sum: &mut f32, lo: &mut f32, delta: f32| {
@@ -251,7 +252,7 @@ impl Bodies {
         ]
     }
 
-    /// Position of the origin of body `i`'s frame (m), as scenes give it.
+    /// Position of the origin of body `i`'s frame (m), as in [`BodyDef::position`].
     pub fn origin(&self, i: usize) -> [f64; 2] {
         let [x, y] = self.center(i);
         let offset = self.pose(i).rotation.rotate(self.local_center[i]).as_dvec2();

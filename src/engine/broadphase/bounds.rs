@@ -1,34 +1,33 @@
 //! Fat boxes: bounds with a margin, and a cheap test whether a body may have left its own.
 //!
-//! **The promise.** The fat box of a shape contains the shape's bounds grown by
-//! [`SPECULATIVE_DISTANCE`], up to the rounding of coordinates. So two shapes whose fat boxes are
-//! apart are further apart than the narrow phase looks.
+//! **The guarantee.** The fat box of a shape contains the shape's bounds grown by [`SPECULATIVE_DISTANCE`],
+//! up to the rounding of coordinates. So two shapes with separate fat boxes are further apart than the
+//! look-ahead distance of the narrow phase.
 //!
-//! **The test.** Let a shape be the core points c in its body's frame, grown by a radius; x the
-//! body's center of mass and R its rotation as a unit complex number. From a reference pose
-//! (x₀, R₀) to (x, R) a core point moves by (x − x₀) + (R − R₀)c, and multiplying by R − R₀ scales
-//! lengths by |R − R₀|. With reach r = max |c| the bounds therefore move, on every side, by no
-//! more than
+//! **The test.** Let a shape be the core points c in its body's frame, grown by a radius; x the body's center
+//! of mass, and R its rotation as a unit complex number. From a reference pose (x₀, R₀) to (x, R) a core
+//! point moves by (x − x₀) + (R − R₀)c, and multiplying by R − R₀ scales lengths by |R − R₀|. With reach
+//! r = max |c|, the bounds therefore move on every side by no more than
 //!
 //! ```text
 //! max(|x − x₀|, |y − y₀|) + r |R − R₀|                                     (1)
 //! ```
 //!
-//! The radius moves with its core and adds nothing. If, at the reference pose, the grown bounds
-//! were everywhere at least `slack` inside of the fat box, they still are inside while (1) is no
-//! more than `slack`. That takes six numbers per body and no look at its shapes. Only where (1) is
-//! more, bounds are computed; if they are inside after all, as they may be where a body has
-//! turned, the reference moves to the present pose.
+//! The radius moves with its core and adds nothing. Suppose that at the reference pose the grown bounds were
+//! at least `slack` inside the fat box on all sides. Then they still are inside while (1) is no more than
+//! `slack`. This takes six numbers per body and no access to its shapes. Only if (1) is larger, bounds are
+//! computed. They may still be inside, for example after a rotation; the reference then moves to the current
+//! pose.
 //!
-//! **Rounding.** x − x₀ is exact where the two are within a factor of two (Sterbenz), else it is
-//! off by half a unit of the last place of the larger; R is off by a few ε; and bounds are, by a
-//! few ε of their coordinates. `slack` is short of the distance by 16 ε of the largest coordinate
-//! and a thousandth of itself for all of them.
+//! **Rounding.** x − x₀ is exact if the two are within a factor of two (Sterbenz); otherwise its error is
+//! half a unit in the last place of the larger. The error of R is a few ε, and that of bounds a few ε of
+//! their coordinates. To cover all of them, `slack` is reduced by 16 ε of the largest coordinate and by a
+//! thousandth of itself.
 //!
-//! **The margin.** A margin saves searches while a body stays in it, and costs a candidate for
-//! every neighbor that is near and does not touch. So it is a fraction of the shape and at most
-//! [`AABB_MARGIN`]; and nothing for a shape that would cross it within [`LASTS`] steps, which
-//! would be searched for all the same, and nothing for static bodies.
+//! **The margin.** A margin saves searches while a body stays inside it, and adds a candidate for every
+//! neighbor that is near but does not touch. So it is a fraction of the shape's size and at most
+//! [`AABB_MARGIN`]. It is zero for a shape that would cross it within [`LASTS`] steps, which would be
+//! searched anyway, and for static bodies.
 //!
 //! **Source:** boxes with a margin, Catto 2019 (`catto2019`). **Departure:** the test of (1).
 
@@ -43,10 +42,10 @@ use wide::{f32x8, f32x16};
 /// Margin as a fraction of the larger side of a shape's bounds (1).
 const MARGIN_FRACTION: f32 = 0.1;
 
-/// Steps that a margin has to last to be given (1).
+/// Minimum number of steps that a margin must last; otherwise there is no margin (1).
 const LASTS: f32 = 2.0;
 
-/// Where bodies were when their bounds were last looked at; arrays of `[bodies]`.
+/// Poses of bodies when their bounds were last computed; arrays of `[bodies]`.
 #[derive(Clone, Debug, Default)]
 pub struct FatBoxes {
     x: LaneVec,
@@ -55,27 +54,27 @@ pub struct FatBoxes {
     sin: LaneVec,
     /// r of (1), the largest of the body's shapes (m).
     reach: LaneVec,
-    /// The least of the body's shapes (m), infinite for a static body.
+    /// The smallest slack of the body's shapes (m); infinite for a static body.
     slack: LaneVec,
-    /// Each shape in lanes, `[shapes]`.
+    /// Core points of each shape, for lanes, `[shapes]`.
     outlines: Vec<CoreOutline>,
-    /// First shape of each body; its shapes follow one another.
+    /// First shape of each body; the shapes of a body are consecutive.
     first_shape: Vec<u32>,
     /// Bodies that fail the test.
     failed: Vec<u32>,
-    /// Shapes that have a new fat box, ascending.
+    /// Shapes with a new fat box, ascending.
     moved: Vec<u32>,
 }
 
 impl FatBoxes {
-    /// Bytes held.
+    /// Allocated bytes.
     pub fn held_bytes(&self) -> usize {
         let columns = [&self.x, &self.y, &self.cos, &self.sin, &self.reach, &self.slack];
         let lists = held(&self.first_shape) + held(&self.failed) + held(&self.moved);
         columns.iter().map(|c| c.bytes()).sum::<usize>() + held(&self.outlines) + lists
     }
 
-    /// Adds a body, or replaces one. Its shapes begin with shape `first`.
+    /// Adds or replaces a body. Its first shape is shape `first`.
     pub fn set(&mut self, body: usize, first: usize, shapes: &[Shape]) {
         if body == self.first_shape.len() {
             self.first_shape.push(first as u32);
@@ -96,20 +95,21 @@ impl FatBoxes {
         self.forget(body);
     }
 
-    /// Looks at the body in the next update, whether it moved or not.
+    /// Recomputes the body's boxes in the next update, even if it does not move.
     pub fn forget(&mut self, body: usize) {
-        // Below any distance.
+        // Less than any distance.
         self.slack[body] = -1.0;
     }
 
-    /// Never looks at the body again.
+    /// Excludes the body from all later updates.
     pub fn remove(&mut self, body: usize) {
         self.slack[body] = f32::INFINITY;
     }
 
-    /// Renews the boxes of shapes that left theirs; returns those shapes, ascending.
+    /// Recomputes the fat boxes that shapes have left; returns those shapes, ascending.
     ///
-    /// `dt` (s) is the step over which velocities are thought to last.
+    /// `dt` (s) is the time step over which velocities are assumed constant; `unit` is the length unit that
+    /// lengths of the parameters are multiplied by.
     pub fn update(&mut self, bodies: &Bodies, [dt, unit]: [f32; 2], proxies: &mut [Proxy]) -> &[u32] {
         self.moved.clear();
         self.moved.reserve(self.outlines.len());
@@ -120,7 +120,7 @@ impl FatBoxes {
         &self.moved
     }
 
-    /// Lists the bodies for which (1) exceeds the slack, or is no number.
+    /// Lists the bodies for which (1) exceeds the slack or is NaN.
     fn find_failed(&mut self, bodies: &Bodies) {
         self.failed.clear();
         let count = self.first_shape.len();
@@ -144,7 +144,7 @@ impl FatBoxes {
         }
     }
 
-    /// Renews the boxes of one body where needed, and makes its pose the reference.
+    /// Recomputes the boxes of one body if needed, and makes its pose the reference.
     fn look_at(&mut self, body: usize, bodies: &Bodies, [dt, unit]: [f32; 2], proxies: &mut [Proxy]) {
         let pose = bodies.pose(body);
         let first = self.first_shape[body] as usize;
@@ -173,7 +173,7 @@ impl FatBoxes {
     }
 }
 
-/// Smallest margin between `tight` and `fat` over all sides, less possible rounding.
+/// Smallest distance between `tight` and `fat` over all sides, minus the possible rounding error.
 fn inset(fat: &Aabb, tight: &Aabb) -> f32 {
     let low = (tight.min - fat.min).min_element();
     let high = (fat.max - tight.max).min_element();
@@ -181,7 +181,7 @@ fn inset(fat: &Aabb, tight: &Aabb) -> f32 {
     (low.min(high) * 0.999 - 16.0 * f32::EPSILON * largest).max(0.0)
 }
 
-/// The core points of a shape, some of them repeated, and its radius (m).
+/// The core points of a shape, some repeated, and its radius (m).
 #[derive(Clone, Copy, Debug)]
 struct CoreOutline {
     x: [f32; MAX_POLYGON_VERTICES],
@@ -206,7 +206,7 @@ impl CoreOutline {
         self.x.iter().zip(&self.y).map(|(&x, &y)| Vec2::new(x, y).length()).fold(0.0, f32::max)
     }
 
-    /// [`Shape::aabb`], by the same operations on all points at once.
+    /// [`Shape::aabb`], with the same operations on all points at once.
     #[inline]
     fn bounds(&self, pose: &Pose) -> Aabb {
         let (cos, sin) = (f32x8::splat(pose.rotation.x), f32x8::splat(pose.rotation.y));

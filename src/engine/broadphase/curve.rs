@@ -1,12 +1,12 @@
 //! Hilbert's curve.
 
-/// Bits of a coordinate on the curve.
+/// Bits per coordinate on the curve.
 pub const BITS: u32 = 10;
 
-/// Distance along Hilbert's curve of a cell of the square of 2^[`BITS`] cells.
+/// Distance along Hilbert's curve of a cell of the square of 2^[`BITS`] cells per side.
 ///
-/// From the largest quadrants to the smallest: the curve passes the quadrants (0,0), (0,1),
-/// (1,1), (1,0), mirrored in the first and the last so that it joins its neighbors.
+/// Proceeds from the largest quadrants to the smallest. The curve passes the quadrants (0,0), (0,1), (1,1),
+/// (1,0), mirrored in the first and the last so that the parts connect.
 pub fn hilbert(mut x: u32, mut y: u32) -> u32 {
     let mut along = 0;
     for bit in (0..BITS).rev() {
@@ -26,7 +26,7 @@ pub fn hilbert(mut x: u32, mut y: u32) -> u32 {
 mod tests {
     use super::*;
 
-    /// Neighbors on the curve are neighbors in the square, and every cell is passed once.
+    /// Neighbors on the curve are neighbors in the square, and every cell is visited once.
     #[test]
     fn the_curve_is_hilberts() {
         let side = 1u32 << BITS;

@@ -1,29 +1,26 @@
 //! A hash grid with one level per size class, rebuilt from scratch each step.
 //!
-//! **Cells.** A proxy lies in exactly one cell: that of its lower corner, on a
-//! grid whose cell is larger than the proxy. Memory is therefore linear in the
-//! number of proxies whatever their sizes, and a pair can only be met once.
+//! **Cells.** A proxy lies in exactly one cell, that of its lower corner, on a grid with cells larger than
+//! the proxy. Memory is therefore linear in the number of proxies whatever their sizes, and a pair can be
+//! found only once.
 //!
-//! Let h be the cell and c(x) = ⌊x/h⌋. If a and b overlap on an axis, then
-//! b.min ≤ a.max, and a.min ≤ b.max < b.min + h, hence
+//! Let h be the cell size and c(x) = ⌊x/h⌋. If a and b overlap on an axis, then b.min ≤ a.max, and a.min ≤
+//! b.max < b.min + h, hence
 //!
 //! ```text
 //! c(a.min) − 1 ≤ c(b.min) ≤ c(a.max)                                   (1)
 //! ```
 //!
-//! Cells are powers of two, so x/h is exact and (1) holds in floating point as
-//! it does on paper: rounding is monotone, so if a rounded extent is below h
-//! (itself a float), the true one is too.
+//! Cell sizes are powers of two, so x/h is exact, and (1) holds in floating point as in exact arithmetic:
+//! rounding is monotone, so if a rounded extent is below h (itself a float), so is the true one.
 //!
-//! **Levels.** One cell size for all would fill a cell with thousands of grains
-//! because of one boulder. Sizes are cut into classes of two octaves, each
-//! with its own grid. A proxy looks for partners on its own level and on all
-//! coarser ones, where (1) holds with the coarser h.
+//! **Levels.** With a single cell size, one boulder would put thousands of grains into one cell. Sizes are
+//! therefore divided into classes of two octaves, each with its own grid. A proxy looks for partners on its
+//! own level and on all coarser ones, where (1) holds with the coarser h.
 //!
-//! **Buckets.** Sixteen neighboring cells of a row form a block, and blocks are
-//! hashed: a row of two or three cells is one contiguous run of entries, or two
-//! where it crosses a block. Hashing whole rows instead would be one run always,
-//! but proxies spaced by the table's size would all share a bucket.
+//! **Buckets.** Sixteen neighboring cells of a row form a block, and blocks are hashed. A row of two or three
+//! cells is then one contiguous run of entries, or two if it crosses a block. Hashing whole rows would always
+//! give one run, but proxies spaced by the table's size would all share a bucket.
 //!
 //! **Source:** cells hashed into a table, Teschner et al. 2003
 //! (`teschner2003`); a grid per size class, Mirtich 1996 (`mirtich1996`).
@@ -34,25 +31,25 @@ use crate::engine::lanes::held;
 use glam::Vec2;
 use std::ops::Range;
 
-/// Cells in a block: large enough that a run seldom crosses one. At least 4,
-/// so that cells which (1) cannot tell apart never share a bucket.
+/// Cells in a block: large enough that a run seldom crosses a block. At least 4, so that the cells left open
+/// by (1) never share a bucket.
 const BLOCK: usize = 1 << BLOCK_BITS;
 const BLOCK_BITS: u32 = 4;
 
-/// Buckets on a level, per proxy of the level: fewer collide, more cost a longer prefix sum.
+/// Buckets per proxy of a level. More buckets mean fewer collisions but a longer prefix sum.
 const BUCKETS_PER_PROXY: usize = 2;
 
-/// Levels of no more proxies than this are tested one by one, without their
-/// grid: the ground and its walls.
+/// Levels with at most this many proxies, such as the ground and walls, are tested proxy by proxy, without
+/// their grid.
 const SCAN: usize = 8;
 
 /// A cell index has at most this many bits (and sign), so that it is exact in `f32`.
 const CELL_BITS: i32 = 22;
 
-/// Cell sizes 2^(k − 127) for k in 0..CLASSES; the last one stands for "infinite".
+/// Cell sizes 2^(k − 127) for k in 0..CLASSES; the last one means "infinite".
 const CLASSES: usize = 257;
 
-/// Finds candidate pairs; buffers are kept from call to call.
+/// Finds candidate pairs. Buffers are reused between calls.
 #[derive(Clone, Debug, Default)]
 pub struct HashGrid {
     /// Finest first.
@@ -63,9 +60,9 @@ pub struct HashGrid {
     bucket: Vec<u32>,
     /// First entry of each bucket, `[buckets + 2]`.
     starts: Vec<u32>,
-    /// Proxies by bucket, so that a run of cells is read as a stream.
+    /// Proxies by bucket: a run of cells is a contiguous range.
     entries: Vec<GridEntry>,
-    /// Pairs as they are met; only a prefix is in use.
+    /// Pairs in the order found; only a prefix is used.
     found: Vec<[u32; 2]>,
     sort: PairSort,
 }
@@ -80,30 +77,30 @@ struct GridEntry {
 struct GridLevel {
     /// 1/h, zero for the infinite cell (1/m).
     inv_cell: f32,
-    /// Its first bucket.
+    /// First bucket of the level.
     base: u32,
-    /// Its number of blocks.
+    /// Number of blocks of the level.
     blocks: u32,
-    /// Its entries.
+    /// Entries of the level.
     entries: Range<usize>,
 }
 
 impl GridLevel {
-    /// Index of the cell that holds coordinate `x`.
+    /// Index of the cell that contains coordinate `x`.
     #[inline]
     fn cell(&self, x: f32) -> i32 {
         // NaN becomes 0. |x|/h < 2^23 by the choice of class.
         (x * self.inv_cell).floor() as i32
     }
 
-    /// Row of the cell that holds the proxy.
+    /// Row of the cell that contains the proxy.
     #[inline]
     fn row(&self, proxy: &Proxy) -> i32 {
         self.cell(proxy.aabb.min.y)
     }
 
-    /// Cells of the two corners; a proxy below the cell size reaches into the
-    /// next cell at most (the minimum only cuts what NaN would make of it).
+    /// Cells of the two corners. A proxy smaller than a cell extends at most into the next cell (the minimum
+    /// only limits the effect of NaN).
     #[inline]
     fn cells(&self, proxy: &Proxy) -> ([i32; 2], [i32; 2]) {
         let Vec2 { x, y } = proxy.aabb.min;
@@ -115,8 +112,8 @@ impl GridLevel {
     /// Bucket of cell (x, y).
     #[inline]
     fn bucket(&self, x: i32, y: i32) -> usize {
-        // Multiples of 1/φ and √2 − 1 modulo one: rationally independent, and
-        // each spreads consecutive integers evenly.
+        // Multiples of 1/φ and √2 − 1 modulo one: rationally independent, and each distributes consecutive
+        // integers evenly.
         let block = ((x >> BLOCK_BITS) as u32)
             .wrapping_mul(0x6A09_E667)
             .wrapping_add((y as u32).wrapping_mul(0x9E37_79B1));
@@ -125,14 +122,14 @@ impl GridLevel {
     }
 }
 
-/// Place of column x in its block.
+/// Index of column x within its block.
 #[inline]
 fn offset(x: i32) -> usize {
     x as usize % BLOCK
 }
 
-/// k such that the cell h = 2^(k − 127) is larger than the proxy, and no
-/// finer than the spacing of floats at its place: |x|/h < 2^(CELL_BITS + 1).
+/// k such that the cell size h = 2^(k − 127) is larger than the proxy and no finer than the spacing of floats
+/// at its position: |x|/h < 2^(CELL_BITS + 1).
 fn size_class(proxy: &Proxy) -> u16 {
     // Biased exponent: 2^(e − 127) ≤ |x| < 2^(e − 126), and 255 for ∞ and NaN.
     let exponent = |x: f32| (x.abs().to_bits() >> 23) as i32;
@@ -145,7 +142,7 @@ fn size_class(proxy: &Proxy) -> u16 {
 }
 
 impl HashGrid {
-    /// Bytes held.
+    /// Allocated bytes.
     pub fn held_bytes(&self) -> usize {
         self.bytes() + held(&self.found)
     }
@@ -162,8 +159,8 @@ impl HashGrid {
         self.sort.sort(proxies.len(), &self.found[..found], out);
     }
 
-    /// Bytes of memory that depend on the proxies but not on the pairs; at
-    /// most 64 per proxy and 16 KiB in all on a grid that has not shrunk.
+    /// Bytes of memory that depend on the proxies but not on the pairs: at most 64 per proxy plus 16 KiB, on
+    /// a grid that has not shrunk.
     pub fn bytes(&self) -> usize {
         self.levels.capacity() * size_of::<GridLevel>()
             + self.class.capacity() * size_of::<u16>()
@@ -193,8 +190,8 @@ impl HashGrid {
             self.bucket.push(bucket as u32);
             self.starts[bucket + 2] += 1;
         }
-        // After this sum bucket b starts at starts[b + 1], which the scatter
-        // moves on to its end, where b + 1 starts.
+        // After this sum, bucket b starts at starts[b + 1]. The scatter advances this entry to the end of the
+        // bucket, where b + 1 starts.
         let mut sum = 0;
         for start in &mut self.starts {
             sum += *start;
@@ -242,16 +239,16 @@ impl HashGrid {
         level_of
     }
 
-    /// Meets every candidate pair once; returns how many are in `found`.
+    /// Finds every candidate pair once; returns their number in `found`.
     fn search(&mut self) -> usize {
         let mut search =
             GridSearch { starts: &self.starts, entries: &self.entries, found: &mut self.found, len: 0 };
         for (i, level) in self.levels.iter().enumerate() {
             for position in level.entries.clone() {
                 let entry = self.entries[position];
-                // On its own level a proxy looks right and up only: at later
-                // entries of its cell, at the next cell of its row, and at the
-                // row above. Of two partners exactly one sees the other.
+                // On its own level a proxy is tested only against cells to the right and above: later entries
+                // of its cell, the next cell of its row, and the row above. Each pair is thus found from
+                // exactly one side.
                 let ([x0, y0], [x1, y1]) = level.cells(&entry.proxy);
                 let crosses = offset(x1) < offset(x0);
                 let cell = level.bucket(x0, y0);
@@ -290,9 +287,9 @@ struct GridSearch<'a> {
 impl GridSearch<'_> {
     /// Tests `entry` against cells x0..=x1 of row y, at most three of them.
     ///
-    /// Other rows may share the buckets and are met through their own. Of row
-    /// y itself no stranger is let in: the cells that (1) leaves in question
-    /// are four neighbors at most, and those never share a bucket.
+    /// Other rows may share the buckets; they are filtered out, and visited through their own. Cells of row y
+    /// outside the range cannot appear: the cells left open by (1) are four neighbors at most, and those
+    /// never share a bucket.
     #[inline]
     fn row(&mut self, entry: &GridEntry, level: &GridLevel, y: i32, x0: i32, x1: i32) {
         let (first, last) = (level.bucket(x0, y), level.bucket(x1, y));
@@ -315,7 +312,7 @@ impl GridSearch<'_> {
         if self.found.len() < self.len + run.len() {
             self.found.resize((self.len + run.len()).max(2 * self.found.len()), [0; 2]);
         }
-        // Write first, then keep or not: no branch, see `Proxy::may_touch`.
+        // Write first, then keep or discard: branch-free, see `Proxy::may_touch`.
         let free = &mut self.found[self.len..self.len + run.len()];
         let mut hits = 0;
         for other in run {

@@ -1,9 +1,9 @@
 //! Broad phase: finds pairs of shapes whose bounds overlap.
 //!
-//! Every kind gives the same sorted list, so the choice changes only the time: [`all_pairs`] is the definition,
-//! [`HashGrid`] keeps no state, [`Tree`] keeps its order and its list. [`FatBoxes`] determine which shapes need a
-//! search; a step in which none has left its fat box searches nothing. Nanoseconds per proxy (Zen 5, 16 lanes) for
-//! the scenes in motion, with the share of proxies that left their fat boxes:
+//! Every kind gives the same sorted list, so the choice affects only the time. [`all_pairs`] is the
+//! definition, [`HashGrid`] keeps no state, and [`Tree`] keeps its order and its list. [`FatBoxes`] determine
+//! which shapes need a search; a step in which no shape has left its fat box searches nothing. Nanoseconds
+//! per proxy (Zen 5, 16 lanes) for scenes in motion, with the fraction of proxies that left their fat boxes:
 //!
 //! ```text
 //!                     proxies   pairs   moved    grid    tree
@@ -15,8 +15,8 @@
 //! junkyard             8 262    1 223    95 %      45      12
 //! ```
 //!
-//! So the tree is faster in all of them. Rebuilding its order takes another 15 to 40 ns per proxy, so the grid is
-//! faster in dense scenes whose proxies jump in every step.
+//! The tree is faster in all of them. Rebuilding its order takes another 15 to 40 ns per proxy, so the grid
+//! is faster in dense scenes in which proxies jump in every step.
 
 mod all_pairs;
 mod bounds;
@@ -38,28 +38,28 @@ use crate::engine::shapes::Aabb;
 /// A shape in the broad phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Proxy {
-    /// Bounds, grown by whatever the narrow phase looks ahead (m).
+    /// Bounds, including the look-ahead distance of the narrow phase (m).
     pub aabb: Aabb,
-    /// Body of the shape; shapes of one body never meet.
+    /// Body of the shape. Shapes of one body never form pairs.
     pub body: u32,
-    /// Proxies of the same non-zero group never meet.
+    /// Proxies of the same non-zero group never form pairs.
     pub group: i32,
-    /// Whether the body answers to impulses; two that do not never meet.
+    /// Whether the body is dynamic. Two proxies that are not never form pairs.
     pub dynamic: bool,
 }
 
 impl Proxy {
-    /// Whether the shapes may touch: closed bounds overlap, the bodies differ,
-    /// one of them is dynamic, and they do not share a non-zero group.
+    /// Whether the shapes may touch: closed bounds overlap, the bodies differ, at least one is dynamic, and
+    /// they do not share a non-zero group.
     ///
-    /// Free of branches: where sizes and places are irregular, branches here made the
-    /// grid take 1.4 times as long; on the lattice of a pyramid they saved a quarter.
+    /// Branch-free: with irregular sizes and positions, branches here made the grid take 1.4 times as long;
+    /// on the lattice of a pyramid they saved a quarter.
     #[inline]
     pub fn may_touch(&self, other: &Proxy) -> bool {
         overlap(&self.aabb, &other.aabb) & self.may_meet(other)
     }
 
-    /// [`Self::may_touch`] without the look at the bounds.
+    /// [`Self::may_touch`] without the test of the bounds.
     #[inline]
     pub fn may_meet(&self, other: &Proxy) -> bool {
         (self.body != other.body)
@@ -74,7 +74,7 @@ fn overlap(a: &Aabb, b: &Aabb) -> bool {
     (a.min.x <= b.max.x) & (b.min.x <= a.max.x) & (a.min.y <= b.max.y) & (b.min.y <= a.max.y)
 }
 
-/// How candidate pairs are found.
+/// Method for finding candidate pairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum BroadPhaseKind {
@@ -93,7 +93,7 @@ impl BroadPhaseKind {
         [BroadPhaseKind::HashGrid, BroadPhaseKind::Tree, BroadPhaseKind::AllPairs];
 }
 
-/// A broad phase of one kind with its buffers.
+/// A broad phase with its buffers.
 #[derive(Clone, Debug)]
 pub enum BroadPhase {
     /// See [`HashGrid`].
@@ -114,7 +114,7 @@ impl BroadPhase {
         }
     }
 
-    /// Bytes held.
+    /// Allocated bytes.
     pub fn held_bytes(&self) -> usize {
         match self {
             BroadPhase::HashGrid(grid) => grid.held_bytes(),
@@ -123,11 +123,11 @@ impl BroadPhase {
         }
     }
 
-    /// Writes to `out` every `[i, j]`, i < j, with `proxies[i].may_touch(&proxies[j])`,
-    /// each once and in ascending order. What `out` held is dropped, its memory is kept.
+    /// Writes to `out` every `[i, j]`, i < j, with `proxies[i].may_touch(&proxies[j])`, each once and in
+    /// ascending order. The previous contents of `out` are dropped; its memory is reused.
     ///
-    /// Proxies are told apart by their place: between calls a proxy may move
-    /// and change, and proxies may be added or removed at the end.
+    /// Proxies are identified by their index. Between calls, proxies may move and change, and may be added or
+    /// removed at the end.
     pub fn pairs(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>) {
         match self {
             BroadPhase::HashGrid(grid) => grid.pairs(proxies, out),
@@ -136,9 +136,8 @@ impl BroadPhase {
         }
     }
 
-    /// Brings `pairs` up to date: it holds what the last call gave, and since then only the
-    /// proxies in `moved`, ascending, have changed in any way. The result is that of
-    /// [`BroadPhase::pairs`].
+    /// Updates `pairs`, the result of the last call. Since then only the proxies in `moved` (ascending) may
+    /// have changed. The result is that of [`BroadPhase::pairs`].
     pub fn update(&mut self, proxies: &[Proxy], moved: &[u32], pairs: &mut Vec<[u32; 2]>) {
         match self {
             BroadPhase::Tree(tree) => tree.update(proxies, moved, pairs),

@@ -3,12 +3,12 @@
 use crate::engine::lanes::Block;
 use wide::f32x16;
 
-/// Children of a node.
+/// Number of children of a node.
 pub const FAN: usize = 1 << BITS_OF_FAN;
-/// Its logarithm.
+/// Binary logarithm of [`FAN`].
 pub const BITS_OF_FAN: usize = 4;
 
-/// Sixteen boxes; lanes without one hold NaN, which meets nothing.
+/// Sixteen boxes. Lanes without a box hold NaN, which overlaps nothing.
 #[derive(Clone, Copy, Debug)]
 pub struct Node {
     /// min x, min y, max x, max y.
@@ -16,10 +16,10 @@ pub struct Node {
 }
 
 impl Node {
-    /// No box.
+    /// A node without boxes.
     pub const EMPTY: Node = Node { sides: [Block([f32::NAN; FAN]); 4] };
 
-    /// Sets a lane; a box with a NaN is none.
+    /// Sets the box of a lane. A box with a NaN counts as no box.
     #[inline]
     pub fn set(&mut self, lane: usize, sides: [f32; 4]) {
         let sides = if sides.iter().any(|side| side.is_nan()) { [f32::NAN; 4] } else { sides };
@@ -28,7 +28,7 @@ impl Node {
         }
     }
 
-    /// The lanes whose boxes share a point with the query's.
+    /// Bit mask of the lanes whose boxes overlap the query's (closed).
     #[inline]
     pub fn hits(&self, query: &[f32x16; 4]) -> u32 {
         let [min_x, min_y, max_x, max_y] = self.sides.map(|side| f32x16::new(side.0));
@@ -37,13 +37,14 @@ impl Node {
         (x & y).to_bitmask() & 0xFFFF
     }
 
-    /// The box of a lane in all lanes.
+    /// The box of a lane, copied to all lanes.
     #[inline]
     pub fn query(&self, lane: usize) -> [f32x16; 4] {
         [0, 1, 2, 3].map(|side: usize| f32x16::splat(self.sides[side].0[lane]))
     }
 
-    /// Bounds of all lanes; the minimum of a number and a NaN is the number.
+    /// Bounds of all lanes. Lanes without a box are ignored, since the minimum of a number and NaN is the
+    /// number.
     #[inline]
     pub fn bounds(&self) -> [f32; 4] {
         let fold = |side: &Block, pick: fn(f32, f32) -> f32| {

@@ -1,4 +1,4 @@
-//! Where a query looks: a box or a ray, tested against sixteen boxes at once.
+//! Query regions: a box or a ray, tested against sixteen boxes at once.
 
 use super::node::{FAN, Node};
 use super::{BroadPhase, Proxy};
@@ -6,43 +6,44 @@ use crate::engine::shapes::Aabb;
 use glam::Vec2;
 use wide::f32x16;
 
-/// Where a query looks.
+/// A query region.
 #[derive(Clone, Copy, Debug)]
 pub enum Region {
     /// A box: min x, min y, max x, max y (m).
     Area([f32; 4]),
     /// A ray.
     Ray {
-        /// Where it begins (m).
+        /// Start point (m).
         origin: [f32; 2],
-        /// Reciprocals of its direction.
+        /// Reciprocals of the components of its direction.
         inverse: [f32; 2],
-        /// Distance that it searches (m).
+        /// Search distance (m).
         reach: f32,
     },
 }
 
 impl Region {
-    /// All boxes that meet this one.
+    /// All boxes that overlap this one.
     pub fn area(area: Aabb) -> Self {
         Region::Area([area.min.x, area.min.y, area.max.x, area.max.y])
     }
 
-    /// All boxes that meet a ray with a unit direction.
+    /// All boxes on a ray with a unit direction.
     pub fn ray(origin: Vec2, along: Vec2, reach: f32) -> Self {
-        // Finite, so that 0 · ∞ never appears: a ray along an axis leaves it by 10⁻²⁰ of its length.
+        // Finite, so that 0 · ∞ never occurs: a ray along an axis deviates by 10⁻²⁰ of its length.
         let inverse = |x: f32| if x.abs() < 1e-20 { 1e20_f32.copysign(x) } else { 1.0 / x };
         Region::Ray { origin: origin.into(), inverse: [inverse(along.x), inverse(along.y)], reach }
     }
 
-    /// Makes a ray shorter.
+    /// Shortens a ray.
     pub fn shorten(&mut self, to: f32) {
         if let Region::Ray { reach, .. } = self {
             *reach = to;
         }
     }
 
-    /// The lanes of a node that it meets. Boxes of shapes are larger than their shapes by more than rounding.
+    /// The lanes of a node that overlap the region. The boxes of shapes exceed their shapes by more than the
+    /// rounding error.
     fn hits(&self, node: &Node) -> u32 {
         let (origin, inverse, reach) = match *self {
             Region::Area(sides) => return node.hits(&sides.map(f32x16::splat)),
@@ -57,21 +58,22 @@ impl Region {
             enter = enter.max(a.min(b));
             leave = leave.min(a.max(b));
         }
-        // Lanes without a box hold NaN, which `max` and `min` leave out.
+        // Lanes without a box hold NaN, which `max` and `min` ignore.
         let is_box = min_x.simd_eq(min_x);
         (enter.simd_le(leave) & is_box).to_bitmask() & 0xFFFF
     }
 }
 
 impl BroadPhase {
-    /// Calls `visit` with each proxy whose box meets the region, which `visit` may make smaller. The tree is that of the
-    /// last call of [`BroadPhase::pairs`] or [`BroadPhase::update`], and `proxies` are the same.
+    /// Calls `visit` with each proxy whose box overlaps the region; `visit` may shrink the region. The tree
+    /// is that of the last call of [`BroadPhase::pairs`] or [`BroadPhase::update`], and `proxies` must be the
+    /// same.
     pub fn visit(&self, proxies: &[Proxy], region: &mut Region, mut visit: impl FnMut(&mut Region, u32)) {
         if let BroadPhase::Tree(tree) = self {
             tree.visit(region, |region, node| region.hits(node), visit);
             return;
         }
-        // The others keep nothing that could be asked.
+        // The other kinds keep no structure to query.
         for (k, chunk) in proxies.chunks(FAN).enumerate() {
             let mut node = Node::EMPTY;
             for (lane, Proxy { aabb: Aabb { min, max }, .. }) in chunk.iter().enumerate() {

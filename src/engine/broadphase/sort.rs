@@ -1,14 +1,14 @@
-//! Sorts pairs that were found in any order.
+//! Sorts pairs found in any order.
 
 use wide::u32x16;
 
-/// Partners that are sorted in lanes.
+/// Most partners that are sorted in lanes.
 const LANES: usize = 16;
 
-/// Partners that are sorted by insertion: on a pyramid, where each has three, lanes are slower.
+/// Most partners that are sorted by insertion. On a pyramid, where each proxy has three, lanes are slower.
 const FEW: usize = 4;
 
-/// Sorts pairs of proxies, the lower first in each; buffers are kept.
+/// Sorts pairs of proxies, each with the lower index first. Buffers are reused.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PairSort {
     /// First pair of each proxy in the sorted list, `[proxies + 2]`.
@@ -16,8 +16,8 @@ pub(super) struct PairSort {
 }
 
 impl PairSort {
-    /// Sorts `found` into `out`: by counting for the lower index, then each proxy's few partners
-    /// among themselves.
+    /// Sorts `found` into `out`: a counting sort by the lower index, then a sort of each proxy's few
+    /// partners.
     pub fn sort(&mut self, proxies: usize, found: &[[u32; 2]], out: &mut Vec<[u32; 2]>) {
         self.first.clear();
         self.first.resize(proxies + 2, 0);
@@ -40,14 +40,14 @@ impl PairSort {
         }
     }
 
-    /// Bytes held.
+    /// Allocated bytes.
     pub fn bytes(&self) -> usize {
         self.first.capacity() * size_of::<u32>()
     }
 }
 
-/// Sorts the partners of one proxy: the place of each is the number of lower ones. Without
-/// branches that depend on the numbers this takes half the time of an insertion sort.
+/// Sorts the partners of one proxy: the position of each is the number of lower ones. Without data-dependent
+/// branches, this takes half the time of an insertion sort.
 #[inline]
 fn sort_partners(pairs: &mut [[u32; 2]]) {
     let count = pairs.len();

@@ -1,29 +1,29 @@
 //! A packed tree of boxes, sixteen children to a node, kept from step to step.
 //!
-//! **Tree.** The leaves hold the proxies in the order of a space-filling curve, sixteen each; a
-//! node holds the bounds of sixteen neighbors of the level below. There are no links: the
-//! children of node k are the nodes 16k to 16k + 15 of the next level. A query tests all children
-//! of a node at once, in lanes.
+//! **Tree.** The leaves hold the proxies in the order of a space-filling curve, sixteen each; a node holds
+//! the bounds of sixteen neighbors of the level below. There are no links: the children of node k are the
+//! nodes 16k to 16k + 15 of the next level. A query tests all children of a node at once, in lanes.
 //!
-//! **Motion.** A proxy keeps its place in the order when it moves, and the bounds above it follow
-//! (refit). Bodies that move together stay neighbors, so the order lasts for many steps. It is
-//! rebuilt when the perimeters of the leaves, which say how many a query enters, have grown by
+//! **Motion.** A proxy keeps its place in the order when it moves, and the bounds above it are refitted.
+//! Bodies that move together stay neighbors, so the order lasts for many steps. The sum of the leaves'
+//! perimeters measures how many leaves a query enters. The order is rebuilt when this sum has grown by
 //! [`REBUILD_THRESHOLD`].
 //!
-//! **Curve.** Hilbert's, through the centers, in a square of 2^[`BITS`] cells. Proxies far larger
-//! than most would stretch the leaf that they share with small ones, so they come first, together.
+//! **Curve.** Hilbert's, through the centers, in a square of 2^[`BITS`] cells per side. Proxies far larger
+//! than most would enlarge the bounds of a leaf that they share with small ones, so they come first,
+//! together.
 //!
-//! **Pairs.** Where few proxies moved, their pairs leave the list and are searched for, one proxy
-//! after the other. Where many did, all pairs are: each leaf descends once, from its bounds, to the
-//! later leaves that these meet, and against those only its members that meet their bounds are
-//! tested, sixteen boxes at a time. A descent for each proxy took two to three times as long.
+//! **Pairs.** If few proxies moved, their pairs are removed from the list and searched again, one proxy after
+//! the other. If many moved, all pairs are searched: each leaf descends once, with its bounds, to the later
+//! leaves that overlap them. Of its members, only those that overlap the bounds of the other leaf are tested
+//! against it, sixteen boxes at a time. One descent per proxy took two to three times as long.
 //!
-//! A tree of two children with surface-area insertion and rotations, each proxy inserted again
-//! when it left its box, was used previously: 1.2 µs for each that did.
+//! An earlier version was a binary tree with surface-area insertion and rotations, in which each proxy was
+//! reinserted when it left its box. It took 1.2 µs per such proxy.
 //!
-//! **Source:** leaves packed along Hilbert's curve, Kamel and Faloutsos 1993 (`kamel1993`); wide
-//! nodes tested in lanes, Wald, Benthin and Boulos 2008 (`wald2008`); refit and rebuild when the
-//! tree is worn, Lauterbach et al. 2006 (`lauterbach2006`).
+//! **Source:** leaves packed along Hilbert's curve, Kamel and Faloutsos 1993 (`kamel1993`); wide nodes tested
+//! in lanes, Wald, Benthin and Boulos 2008 (`wald2008`); refitting, and rebuilding a degraded tree,
+//! Lauterbach et al. 2006 (`lauterbach2006`).
 
 use super::Proxy;
 use super::curve::{BITS, hilbert};
@@ -32,39 +32,39 @@ use super::sort::PairSort;
 use crate::engine::lanes::held;
 use wide::f32x16;
 
-/// The order is rebuilt when the leaves' perimeters have grown by this factor.
+/// The order is rebuilt when the sum of the leaves' perimeters has grown by this factor.
 const REBUILD_THRESHOLD: f32 = 1.15;
 
-/// Lists are merged if no more than one proxy in this many moved.
+/// Pair lists are updated incrementally if at most one proxy in `FEW` moved.
 const FEW: usize = 16;
 
-/// Finds candidate pairs; remembers the last call.
+/// Finds candidate pairs. Keeps its state between calls.
 #[derive(Clone, Debug, Default)]
 pub struct Tree {
     /// Leaves first, root last.
     levels: Vec<Vec<Node>>,
-    /// Proxy in each place of the leaves, `[FAN · leaves]`.
+    /// Proxy at each place of the leaves, `[FAN · leaves]`.
     order: Vec<u32>,
     /// Place of each proxy, `[proxies]`.
     place: Vec<u32>,
-    /// Perimeters of the leaves when the order was made (m).
+    /// Half the perimeters of the leaves when the order was built (m).
     cost_of_order: f32,
-    /// Position on the curve and proxy, the former in the upper half.
+    /// Sort keys: position on the curve in the upper half, proxy in the lower.
     keys: Vec<u64>,
     /// Whether a proxy moved in this call, `[proxies]`.
     moved: Vec<bool>,
-    /// Pairs as they are met, where many proxies moved; only a prefix is in use.
+    /// Pairs in the order found, if many proxies moved; only a prefix is used.
     found: Vec<[u32; 2]>,
     sort: PairSort,
-    /// Pairs as they are met, where few proxies moved.
+    /// Pairs in the order found, if few proxies moved.
     fresh: Vec<[u32; 2]>,
     merged: Vec<[u32; 2]>,
-    /// Level and node.
+    /// Stack of levels and nodes to visit.
     stack: Vec<[u32; 2]>,
 }
 
 impl Tree {
-    /// Bytes held.
+    /// Allocated bytes.
     pub fn held_bytes(&self) -> usize {
         let nodes: usize = self.levels.iter().map(held).sum();
         let lists: usize = [&self.found, &self.fresh, &self.merged, &self.stack].into_iter().map(held).sum();
@@ -115,7 +115,7 @@ impl Tree {
         self.find_moved(proxies, moved, pairs);
     }
 
-    /// Whether there is an order of this many proxies.
+    /// Whether there is an order for this number of proxies.
     fn has_order(&self, proxies: &[Proxy]) -> bool {
         !self.levels.is_empty() && self.place.len() == proxies.len()
     }
@@ -129,7 +129,7 @@ impl Tree {
             extent.to_bits() >> 23
         };
         let sum: u64 = proxies.iter().map(|p| u64::from(exponent(p))).sum();
-        // Four times the mean, or more.
+        // Four or more times the mean.
         let large = (sum / proxies.len().max(1) as u64) as u32 + 2;
         let center = |p: &Proxy| 0.5 * p.aabb.min + 0.5 * p.aabb.max;
         let (mut low, mut high) = (glam::Vec2::INFINITY, glam::Vec2::NEG_INFINITY);
@@ -142,7 +142,7 @@ impl Tree {
         let cells = ((1 << BITS) - 1) as f32;
         let scale = cells / (high - low).max_element();
         for (i, proxy) in proxies.iter().enumerate() {
-            // What is no number becomes 0.
+            // NaN becomes 0.
             let cell = (center(proxy) - low) * scale;
             let along = hilbert(cell.x.min(cells) as u32, cell.y.min(cells) as u32);
             let key = if exponent(proxy) > large { 0 } else { 1 + along };
@@ -176,20 +176,20 @@ impl Tree {
         self.cost_of_order = self.cost();
     }
 
-    /// Rebuilds the order past the rebuild threshold.
+    /// Rebuilds the order if the rebuild threshold is exceeded.
     fn renew_order(&mut self, proxies: &[Proxy]) {
         if self.cost() > REBUILD_THRESHOLD * self.cost_of_order {
             self.make_order(proxies);
         }
     }
 
-    /// Perimeters of the leaves, halved.
+    /// Sum of the leaves' perimeters, halved.
     fn cost(&self) -> f32 {
         let Some(parents) = self.levels.get(1) else { return 0.0 };
         let mut cost = f32x16::ZERO;
         for node in parents {
             let [min_x, min_y, max_x, max_y] = node.sides.map(|side| f32x16::new(side.0));
-            // Of a NaN and zero, zero is taken.
+            // The maximum of NaN and zero is zero.
             cost += ((max_x - min_x) + (max_y - min_y)).fast_max(f32x16::ZERO);
         }
         cost.reduce_add()
@@ -212,7 +212,7 @@ impl Tree {
         self.refit(1);
     }
 
-    /// Sets the boxes of the levels from `first` on.
+    /// Refits the boxes of the levels from `first` on.
     fn refit(&mut self, first: usize) {
         for level in first..self.levels.len() {
             let (below, above) = self.levels.split_at_mut(level);
@@ -222,7 +222,7 @@ impl Tree {
         }
     }
 
-    /// All pairs: each leaf against itself and against the later ones that its bounds meet.
+    /// Finds all pairs: each leaf against itself and against the later leaves that overlap its bounds.
     fn find_all(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>) {
         let mut len = 0;
         for (i, leaf) in self.levels[0].iter().enumerate() {
@@ -236,7 +236,7 @@ impl Tree {
             self.stack.push([self.levels.len() as u32 - 1, 0]);
             while let Some([level, node]) = self.stack.pop() {
                 let level = level as usize;
-                // Leaves before i have met it.
+                // Earlier leaves have already been tested against leaf i.
                 let first = ((i + 1) >> (BITS_OF_FAN * (level - 1))).saturating_sub(node as usize * FAN);
                 let mut hits = self.levels[level][node as usize].hits(&bounds) & (0xFFFF << first.min(FAN));
                 while hits != 0 {
@@ -260,7 +260,7 @@ impl Tree {
         self.sort.sort(proxies.len(), &self.found[..len], out);
     }
 
-    /// Drops the pairs of proxies that moved, and merges in those that they have now.
+    /// Removes the pairs of proxies that moved, and merges in their new pairs.
     fn find_moved(&mut self, proxies: &[Proxy], moved: &[u32], pairs: &mut Vec<[u32; 2]>) {
         self.moved.clear();
         self.moved.resize(proxies.len(), false);
@@ -295,7 +295,8 @@ impl Tree {
         (self.fresh, self.stack) = (fresh, stack);
     }
 
-    /// Calls `visit` with every proxy that `hits` finds in a node, in no order. `region` is handed on to both.
+    /// Calls `visit` with every proxy of a lane returned by `hits` for its node, in no particular order.
+    /// `region` is passed to both.
     pub(super) fn visit<R>(
         &self,
         region: &mut R,
@@ -320,7 +321,7 @@ impl Tree {
         }
     }
 
-    /// Calls `visit` with the sixteen proxies of every leaf that is hit, and which of them are.
+    /// Calls `visit` with the sixteen proxies of every leaf reached, and a mask of those that are hit.
     #[inline]
     fn query(&self, proxy: &Proxy, stack: &mut Vec<[u32; 2]>, mut visit: impl FnMut(&[u32; FAN], u32)) {
         let query = sides(proxy).map(f32x16::splat);
@@ -347,7 +348,7 @@ fn sides(proxy: &Proxy) -> [f32; 4] {
     [min.x, min.y, max.x, max.y]
 }
 
-/// Adds the pairs of the proxy in `place` with those in the lanes `hits` of a leaf.
+/// Appends the pairs of the proxy at `place` with those in the lanes `hits` of a leaf.
 #[inline]
 fn meet(
     proxies: &[Proxy],
@@ -382,7 +383,7 @@ mod tests {
     use crate::engine::shapes::Aabb;
     use glam::Vec2;
 
-    /// A lattice of boxes that shears, frame by frame, and shrinks and grows in number.
+    /// A lattice of boxes that shears from frame to frame and changes in number.
     fn scene(frame: usize, count: usize) -> Vec<Proxy> {
         let place = |i: usize| {
             let (x, y) = ((i % 20) as f32, (i / 20) as f32);
@@ -397,7 +398,7 @@ mod tests {
         (0..count).map(proxy).collect()
     }
 
-    /// Every node has the bounds of its children, every proxy its place.
+    /// Checks that every node has the bounds of its children and every proxy its place.
     fn validate(tree: &Tree, proxies: &[Proxy]) {
         for (i, proxy) in proxies.iter().enumerate() {
             let place = tree.place[i] as usize;
@@ -425,7 +426,8 @@ mod tests {
         }
     }
 
-    /// Four levels, and ever other proxies that move, from one to all that are worth merging.
+    /// Four levels. The moved proxies change from frame to frame; their number ranges from one to the most
+    /// that is updated incrementally.
     #[test]
     fn updates_equal_a_new_tree() {
         let mut proxies = scene(0, 5000);

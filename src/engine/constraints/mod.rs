@@ -1,16 +1,16 @@
-//! Constraints: contacts as lane batches, and the passes that solvers are made of.
+//! Constraints: contacts as lane batches, and the passes from which solvers are built.
 //!
-//! Rooms, in the order in which to read them; each imports from those before it only:
+//! Submodules, in reading order; each imports only from those before it:
 //!
-//! | room | what is in it |
+//! | module | contents |
 //! |---|---|
 //! | [`numerics`] | pure mathematics: matrices, complementarity problems, cones |
-//! | [`records`] | where each number of each constraint is stored; no arithmetic on bodies |
+//! | [`records`] | storage of the numbers of each constraint; no arithmetic on bodies |
 //! | [`kernels`] | passes over bodies and contacts, compiled per width and features |
-//! | [`joints`] | joints as rows, stated once for all passes |
+//! | [`joints`] | joints as rows, defined once for all passes |
 //! | [`vectors`] | a step's problem as λ, v and J |
-//! | [`impacts`] | what happens when bodies hit each other |
-//! | [`step`] | [`Passes`]: all that a solver sees |
+//! | [`impacts`] | laws of impacts between bodies |
+//! | [`step`] | [`Passes`]: the whole interface of a solver |
 
 pub mod impacts;
 pub mod joints;

@@ -1,83 +1,88 @@
-//! When two convex shapes meet that move and turn evenly.
+//! Time of impact of two convex shapes that move and turn at constant rates.
 //!
-//! Let shape a be at rest: b moves in the frame of a, by v along a straight line and by Δθ, both relative over the whole step. At a part t
-//! of the step let d be the distance along the unit axis n from a to b that separates the shapes best. No point of b gets nearer
-//! along n, over a further part s, by more than
+//! Shape a is at rest: b moves in the frame of a, by v along a straight line and by Δθ, both relative over
+//! the whole step. At a fraction t of the step, let n be the unit axis from a to b that separates the shapes
+//! best, and d the distance along n. Over a further fraction s, no point of b approaches along n by more than
 //!
 //! ```text
 //! s c,   c = max(−v·n, 0) + |Δθ| r                                               (1)
 //! ```
 //!
-//! with r its distance from the center of mass (conservative advancement). A vertex at r has the gap g = d + n·r − min n·r, which
-//! changes at first by ġ = v·n + Δθ n·r⊥, and no point that turns about the center is accelerated by more than Δθ² |r|. So it
-//! keeps the distance δ over at least
+//! with r its distance from the center of mass (conservative advancement). A vertex at r has the gap
+//! g = d + n·r − min n·r, which initially changes at ġ = v·n + Δθ n·r⊥. No point that turns about the center
+//! is accelerated by more than Δθ² |r|. So the vertex stays at least at the distance δ over
 //!
 //! ```text
 //! s = max((g − δ)/c,  2 (g − δ)/(−ġ + √(ġ² + 2 Δθ² |r| (g − δ))))               (2)
 //! ```
 //!
-//! and t may advance by the least of all vertices. Near the surface the second bound is a Newton step. Along one axis such steps cost
-//! a few products each; then the distance is found again. A tip that turns away is met after two axes. With the first
-//! bound alone it took 32: the longest step of `simpulse torture --seed 4 --only fast:49 --pace 60`, in which eight bodies come to walls,
-//! was 4.3 medians instead of 1.4.
+//! and t may advance by the minimum over all vertices. Near the surface the second bound is a Newton step.
+//! Along one axis each such step costs a few products; then the distance is recomputed. A tip that turns away
+//! is reached after two axes. With the first bound alone it took 32: the longest step of
+//! `simpulse torture --seed 4 --only fast:49 --pace 60`, in which eight bodies hit walls, was 4.3 medians
+//! instead of 1.4.
 //!
-//! The middle of b is at least its half width w farther along n than its surface is, and it
-//! moves along n by no more than −v·n for the rest of the step, however b turns. So where
+//! The middle of b is at least its half width w farther along n than its surface, and moves along n by at
+//! most −v·n for the rest of the step, however b turns. So if
 //!
 //! ```text
 //! (1 − t)(−v·n) − d ≤ w                                                           (3)
 //! ```
 //!
-//! it does not get through, and the rest is a matter of contacts: a body that slides along a floor does not stop where
-//! the floor's next segment begins. A middle that stops on the surface may be past it in the next step, so bodies stop
-//! from half of w on.
+//! b does not get through, and contacts handle the rest: a body that slides along a floor does not stop where
+//! the floor's next segment begins. A middle that stops on the surface may be past it in the next step, so
+//! the code uses w/2 in (3).
 //!
-//! Where a recedes, b may go on as far as a does in the rest of the step: with its own way w it takes
+//! If a recedes, b may move on as far as a does in the rest of the step. With its own displacement w it takes
+//! the fraction
 //!
 //! ```text
 //! t + (1 − t) r,   r = 1 − (v·n)/(w·n)   if both are negative and r positive,       (4)
 //! ```
 //!
-//! else t. Otherwise it would never reach a wall that recedes, and gravity would add to its speed in every step. Where a comes in, b keeps
-//! its place: what carried it along would carry it through other walls.
+//! otherwise t. Without this it would never reach a receding wall, and gravity would add to its speed in
+//! every step. If a approaches b, b stays in place: being carried along could move it through other walls.
 //!
-//! A body that touches at the start, d ≤ δ, has a contact there that its solver may not have solved to the end. Let u be
-//! the approach of a point of the contact, s its separation, and m the distance of the middle from the surface along n. The body
-//! moves on until a point is in by w/2, if u takes it farther than twice that, and until w/2 is left of m:
+//! A body that touches at the start, d ≤ δ, has a contact there that its solver may not have fully solved.
+//! Let u be the approach of a contact point, s its separation, and m the distance of the middle from the
+//! surface along n. The body moves on until a point is w/2 deep, if u takes the point farther than twice
+//! that, and until w/2 is left of m:
 //!
 //! ```text
 //! t = max(s + w/2, 0)/u   if u > w + max(s, −w/2), the least of all points
 //! t = max(m − w/2, 0)/(−v·n)   if −v·n > max(m, w/2)                               (5)
 //! ```
 //!
-//! So a rod whose tip stands on a floor tips over: its tip does not get in, and its middle and its other end have far to go.
+//! So a rod with its tip on a floor can tip over: its tip does not get in, and its middle and its other end
+//! are far from the floor.
 
 use crate::engine::contacts::{Manifold, ManifoldPoint};
 use crate::engine::narrowphase::Collider;
 use crate::engine::shapes::{Pose, Shape};
 use glam::Vec2;
 
-/// Most axes along which a pair advances; one that reaches this or the next bound stops early.
+/// Maximum number of axes along which a pair advances. A pair that reaches this limit or the next one stops
+/// early.
 const MOST_AXES: u32 = 8;
 
-/// Most steps along one axis.
+/// Maximum number of steps along one axis.
 const MOST_STEPS: u32 = 16;
 
-/// Distances looked at (m): beyond any way of a step.
+/// Search distance (m), larger than any motion in a step.
 const FAR: f32 = 1e9;
 
-/// A body on its way through the step.
+/// A body and its motion over the step.
 pub struct Mover {
-    /// Of the center of mass at the start.
+    /// Pose of the center of mass at the start.
     pub pose: Pose,
-    /// Of the center of mass over the step (m).
+    /// Displacement of the center of mass over the step (m).
     pub way: Vec2,
-    /// Over the step (rad).
+    /// Rotation over the step (rad).
     pub turn: f32,
 }
 
 impl Mover {
-    /// Where it is at a part of the step.
+    /// Pose at a fraction of the step.
     fn at(&self, part: f32) -> Pose {
         Pose {
             position: self.pose.position + part * self.way,
@@ -85,7 +90,7 @@ impl Mover {
         }
     }
 
-    /// Its way in the frame that `other` takes along.
+    /// Its motion relative to the moving frame of `other`.
     fn against(&self, other: &Self) -> Self {
         let back = Vec2::from_angle(-other.turn);
         let end = self.pose.position + self.way - other.pose.position - other.way;
@@ -94,12 +99,13 @@ impl Mover {
     }
 }
 
-/// The part of the step at which the second shape, in the frame of its center of mass, is as near to the first as a contact, or by (5) if
-/// it is so at the start, if its middle would get through it afterward, and by (4) later if the first recedes; at most `limit`.
+/// The fraction of the step after which the second shape, in the frame of its center of mass, stops. It stops
+/// when it is as close to the first as a contact, if its middle would otherwise pass through. If it is that
+/// close at the start, (5) applies. If the first shape recedes, it stops later, by (4). At most `limit`.
 pub fn impact([shape_a, shape_b]: [&Shape; 2], [a, b]: [&Mover; 2], slop: f32, limit: f32) -> f32 {
     let (own, reach) = (b.against(a), shape_b.reach());
     let width = shape_b.min_half_extent().min(reach);
-    // The next step has to see it as a contact, and small bodies are to come near by their own measure.
+    // At most the slop, so that the next step detects a contact; for small bodies, relative to their size.
     let near = slop.min(0.1 * width);
     let Some(pair) = Collider::new(shape_a, shape_b) else { return limit };
     let (mut part, mut pose) = (0.0_f32, own.pose);
@@ -129,13 +135,13 @@ pub fn impact([shape_a, shape_b]: [&Shape; 2], [a, b]: [&Mover; 2], slop: f32, l
     part
 }
 
-/// The part of the step, from `start` on, until which no point of b gets nearer than δ along `n`, from which it is `gap` away at the
-/// start (m): steps of (2), until no more than `enough` of the gap is left.
+/// The fraction of the step, at least `start`, until which no point of b gets closer than δ along `n`. The
+/// gap along `n` is `gap` at `start` (m). Takes steps of (2) until at most `enough` of the gap is left.
 fn free_until(b: &Mover, shape: &Shape, start: f32, n: Vec2, [gap, enough]: [f32; 2]) -> f32 {
     let (rises, turn) = (b.way.dot(n), b.turn.abs());
     let (mut part, mut lowest_at_start) = (start, None);
     for _ in 0..MOST_STEPS {
-        // n in the frame of the body.
+        // n in body axes.
         let rotation = b.at(part).rotation;
         let up = Vec2::new(rotation.x, -rotation.y).rotate(n);
         let mut lowest = f32::INFINITY;
@@ -161,7 +167,7 @@ fn free_until(b: &Mover, shape: &Shape, start: f32, n: Vec2, [gap, enough]: [f32
     part
 }
 
-/// (5): the part of the step that b takes against a, which it touches and which is at rest.
+/// (5): the fraction of the step that b takes, given that it touches a, which is at rest.
 fn while_touching(manifold: &Manifold, b: &Mover, width: f32) -> f32 {
     let n = manifold.normal;
     let (mut part, mut middle) = (1.0_f32, f32::INFINITY);
@@ -185,7 +191,7 @@ mod tests {
     use crate::engine::narrowphase::collide;
     use crate::engine::params::LINEAR_SLOP;
 
-    /// A shape and its way.
+    /// A shape and its motion.
     struct Moving<'s>(&'s Shape, Mover);
 
     fn mover(shape: &Shape, x: f32, y: f32, way: [f32; 2], turn: f32) -> Moving<'_> {
@@ -209,16 +215,16 @@ mod tests {
     fn a_disc_meets_a_wall_when_its_surface_does() {
         let (wall, disc) = (rectangle(0.005, 2.0), Shape::circle("x", Vec2::ZERO, 0.05).unwrap());
         let fixed = mover(&wall, 3.0, 0.0, [0.0; 2], 0.0);
-        // 3 − 0.005 − 0.05 = 2.945 m of 5 m, less half of a tenth of 0.05 m to all of it.
+        // 3 − 0.005 − 0.05 = 2.945 m of 5 m, minus between half and all of a tenth of 0.05 m.
         let part = impact(&fixed, &mover(&disc, 0.0, 0.0, [5.0, 0.0], 0.0), 1.0);
         assert!((2.945 - 5.0 * part) > 0.0 && (2.945 - 5.0 * part) <= 0.005 + 1e-6, "{part}");
-        // It ends before, beside, or on its way out.
+        // Ends before the wall, passes beside it, or is on its way out.
         for (x, y, way) in [(0.0, 0.0, 2.9), (0.0, 2.1, 5.0), (3.0, 0.0, 5.0)] {
             let y_way = mover(&disc, x, y, [way, 0.0], 0.0);
             let found = impact(&fixed, &y_way, 1.0);
             assert!(found == 1.0 || x == 3.0, "{x} {y} {way}: {found}");
         }
-        // From inside outwards it is free to go once the way out is the way it goes.
+        // Free to leave from inside, if it moves in the direction of the normal.
         assert_eq!(impact(&fixed, &mover(&disc, 3.01, 0.0, [5.0, 0.0], 0.0), 1.0), 1.0);
     }
 
@@ -229,9 +235,10 @@ mod tests {
         // 1 mm above the floor, sinking by 2 mm.
         let slider = mover(&small, 0.0, 0.101, [5.0, -0.002], 0.0);
         assert_eq!(impact(&next, &mover(&small, 0.0, 0.11, [5.0, -0.002], 0.0), 1.0), 1.0);
-        // Nearer than half a millimeter at the joint it is: corner against corner has no side (a limit, see the module).
+        // Less than half a millimeter away at the joint it is stopped: corner against corner has no side (a
+        // limitation).
         assert!(impact(&next, &slider, 1.0) < 0.4);
-        // Against its side it is.
+        // Against the side of the floor it is stopped.
         let low = mover(&small, 0.0, -0.3, [5.0, 0.0], 0.0);
         assert!((impact(&next, &low, 1.0) - 1.9 / 5.0).abs() < 0.002);
     }
@@ -240,15 +247,15 @@ mod tests {
     fn what_touches_at_the_start_moves_on_until_it_is_in_by_a_quarter_of_its_width() {
         let (floor, rod) = (rectangle(1.0, 0.5), rectangle(0.02, 0.4));
         let fixed = mover(&floor, 0.0, -0.5, [0.0; 2], 0.0);
-        // 0.1 mm above the floor, and 1 mm in it, with a way of 0.5 m through it.
+        // 0.1 mm above the floor, and 1 mm in it, with a downward motion of 0.5 m.
         for height in [1e-4, -1e-3] {
             let part = impact(&fixed, &mover(&rod, 0.0, 0.4 + height, [0.3, -0.5], 0.0), 1.0);
             assert!((0.5 * part - (height + 0.01)).abs() < 1e-5, "{height}: {part}");
         }
-        // Deeper it waits for its contact; a tip that stands does not hold up the rod.
+        // Deeper, it waits for its contact; a standing tip does not hold up the rod.
         assert_eq!(impact(&fixed, &mover(&rod, 0.0, 0.38, [0.3, -0.5], 0.0), 1.0), 0.0);
         assert_eq!(impact(&fixed, &leaning(&rod, 0.3, 0.7, Vec2::new(-0.1, -0.08), 0.3), 1.0), 1.0);
-        // Nor does it hold up the other end of a plate, which is far from the floor.
+        // Nor does a tip hold up the other end of a plate, which is far from the floor.
         let (plate, angle, turn) = (rectangle(1.0, 0.02), 0.3_f32, -0.05);
         let (arm, height) = (Vec2::from_angle(angle), angle.sin() + 0.02 * angle.cos());
         assert_eq!(impact(&fixed, &leaning(&plate, height, angle, turn * arm.perp(), turn), 1.0), 1.0);
@@ -275,14 +282,14 @@ mod tests {
         let disc = Shape::circle("x", Vec2::ZERO, 0.5).unwrap();
         let (left, right) =
             (mover(&disc, 0.0, 0.0, [5.0, 0.0], 0.0), mover(&disc, 9.0, 0.0, [-5.0, 0.0], 0.0));
-        // 8 m between them at 10 m per step.
+        // 8 m between them, approaching by 10 m per step.
         assert!((impact(&left, &right, 1.0) - 0.8).abs() < 0.001);
         assert_eq!(impact(&left, &right, 0.5), 0.5);
     }
 
     #[test]
     fn what_a_receding_wall_stops_goes_on_as_far_as_the_wall() {
-        // A wall of 10 m turns away below a box that falls on it faster.
+        // A wall of 10 m turns away below a box that falls toward it faster.
         let (wall, small) = (rectangle(10.0, 0.5), rectangle(0.1, 0.1));
         let (turning, way) = (mover(&wall, 0.0, 0.0, [0.0; 2], -0.02), Vec2::new(0.0, -0.6));
         let part = impact(&turning, &mover(&small, 9.0, 0.75, way.into(), 0.0), 1.0);
@@ -290,7 +297,8 @@ mod tests {
         let touch = collide(&wall, &turning.1.at(1.0), &small, &end, FAR);
         let nearest = touch.points().iter().map(|p| p.separation).fold(f32::INFINITY, f32::min);
         assert!(nearest.abs() < 0.01, "{part}: {nearest}");
-        // One that falls as fast as the wall recedes does not stop, and one that a wall comes in at keeps its place.
+        // A box that falls as fast as the wall recedes does not stop; a box that a wall approaches stays in
+        // place.
         assert_eq!(impact(&turning, &mover(&small, 9.0, 0.75, [0.0, -0.18], -0.02), 1.0), 1.0);
         let (comes, still) =
             (mover(&wall, 0.0, 0.0, [0.0, 0.6], 0.0), mover(&small, 0.0, 0.75, [0.1, 0.0], 0.0));

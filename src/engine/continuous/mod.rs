@@ -1,21 +1,22 @@
-//! Continuous collision: a fast body stops where it would pass through a surface.
+//! Continuous collision: fast bodies stop where they would pass through a surface.
 //!
-//! A contact exists once two shapes are [near](crate::engine::params::SPECULATIVE_DISTANCE) each other. A body that
-//! moves farther in a step than half its own width may be past the middle of another body, or completely past it,
-//! before there is a contact. So after the solver has moved the bodies, and before their poses are written, the path
-//! of each such body is traced and cut where its center would pass a surface; the next step finds a contact there.
-//! The velocity stays, so restitution and friction act as usual.
+//! A contact exists only once two shapes are [near](crate::engine::params::SPECULATIVE_DISTANCE) each other.
+//! A body that moves farther in a step than half its own width may get past the middle of another body, or
+//! completely past it, before there is a contact. So after the solver has moved the bodies, and before their
+//! poses are written, the path of each such body is traced and cut where its center would pass a surface; the
+//! next step finds a contact there. The velocity is unchanged, so restitution and friction act as usual.
 //!
 //! Static and kinematic shapes stop every fast body; dynamic shapes stop bullets only
-//! ([`BodyDef::bullet`](crate::engine::bodies::BodyDef::bullet)). Rotation is not traced: a spinning rod, whose
-//! center does not move, may pass through a thin wall. In addition, the center of a slow body never enters a static
-//! shape, whatever presses it.
+//! ([`BodyDef::bullet`](crate::engine::bodies::BodyDef::bullet)). Rotation is not traced: a spinning rod
+//! whose center does not move may pass through a thin wall. In addition, the center of a slow body never
+//! enters a static shape, even under pressure.
 //!
-//! Bodies that joints hold together take the same part of their step: one that stopped alone would tear its joints.
+//! Bodies connected by joints take the same fraction of their step: a body that stopped alone would tear its
+//! joints.
 //!
-//! **Cost.** One comparison per body; for a fast body, a search of the broad phase, a test of its bounds against those of all
-//! kinematic shapes, and a few distance computations for those that it may hit. Scalar code, so the bits are the same at
-//! every width.
+//! **Cost.** One comparison per body. For a fast body also a search of the broad phase, a test of its bounds
+//! against those of all kinematic shapes, and a few distance computations for the shapes that it may hit. The
+//! code is scalar, so the bits are the same at every width.
 //!
 //! **Source.** Conservative advancement: `mirtich1996`.
 
@@ -36,52 +37,52 @@ use std::ops::Range;
 #[derive(Clone, Debug, Default)]
 #[doc(hidden)]
 pub struct Continuous {
-    /// Squared distance that a body may move in a step without a test (m²): half its smallest width. Infinite unless
-    /// dynamic.
+    /// Square of the distance that a body may move in a step without a test (m²). The distance is half its
+    /// smallest width; infinite for bodies that are not dynamic.
     safe_squared: Vec<f32>,
-    /// First shape of each body, and one more.
+    /// First shape of each body, followed by the total number of shapes.
     first_shape: Vec<u32>,
     /// Shapes of kinematic bodies.
     kinematic: Vec<u32>,
-    /// Bodies that move farther than is safe in this step, and the part of the step that they take.
+    /// Bodies that move farther than is safe in this step, each with the fraction of the step that it takes.
     fast: Vec<(u32, f32)>,
-    /// Bodies that joints hold together. `[bodies]`
+    /// Sets of bodies connected by joints. `[bodies]`
     together: DisjointSets,
-    /// Parts of the step, by the least of such bodies. `[bodies]`
+    /// Fraction of the step of each set, stored at its lowest body. `[bodies]`
     parts: Vec<f32>,
 }
 
-/// Finds the proxies whose bounds meet a box, and calls with each.
+/// Calls back with the proxies whose bounds overlap a box.
 #[doc(hidden)]
 pub type Near<'w> = dyn Fn(Aabb, &mut dyn FnMut(u32)) + 'w;
 
-/// Calls with the bodies of every joint with rigid rows.
+/// Calls back with the two bodies of every joint that has rigid rows.
 #[doc(hidden)]
 pub type EachJoined<'w> = dyn Fn(&mut dyn FnMut([u32; 2])) + 'w;
 
-/// Moving bodies, in the form that [`Continuous::shorten`] needs.
+/// Input of [`Continuous::shorten`].
 #[derive(Clone, Copy)]
 #[doc(hidden)]
 pub struct Moving<'w> {
-    /// At the start of the step.
+    /// State at the start of the step.
     pub bodies: &'w Bodies,
-    /// Of the bodies, in their order.
+    /// Shapes, in the order of their bodies.
     pub shapes: &'w [Shape],
-    /// One per shape.
+    /// Proxies, one per shape.
     pub proxies: &'w [Proxy],
-    /// Of the step.
+    /// Contacts of the step.
     pub contacts: &'w [Contact],
-    /// Overlap that position correction leaves alone (m).
+    /// Overlap that position correction leaves uncorrected (m).
     pub slop: f32,
-    /// Whether two bodies do not collide.
+    /// Returns whether collisions between two bodies are disabled.
     pub apart: &'w dyn Fn([u32; 2]) -> bool,
     pub near: &'w Near<'w>,
     pub joined: &'w EachJoined<'w>,
 }
 
 impl Continuous {
-    /// Takes in all bodies of a world, each by its kind and the shapes that it has, none if it was removed. `half_width`: half
-    /// the smallest width of a shape (m).
+    /// Registers all bodies of a world by kind and range of shapes (empty if the body was removed).
+    /// `half_width` returns half the smallest width of a shape (m).
     pub fn build(
         &mut self,
         bodies: impl Iterator<Item = (BodyKind, Range<u32>)>,
@@ -104,13 +105,14 @@ impl Continuous {
         }
     }
 
-    /// Bytes held.
+    /// Allocated bytes.
     pub fn held_bytes(&self) -> usize {
         let Continuous { safe_squared, first_shape, kinematic, fast, together, parts } = self;
         held(safe_squared) + held(first_shape) + held(kinematic) + held(fast) + together.bytes() + held(parts)
     }
 
-    /// Shortens the motions of fast bodies to where they meet what they would pass; returns how many are fast.
+    /// Shortens the motion of fast bodies up to the surfaces that they would pass; returns the number of fast
+    /// bodies.
     pub fn shorten(&mut self, moving: Moving<'_>, rows: &mut [BodyRow]) -> usize {
         press::hold(moving.bodies, moving.contacts, &self.safe_squared, moving.slop, rows);
         self.fast.clear();
@@ -134,7 +136,7 @@ impl Continuous {
         self.fast.len()
     }
 
-    /// Shortens the motion of each fast body, and of what joints hold together with it.
+    /// Shortens the motion of each fast body and of the bodies connected to it by joints.
     fn stop_together(&mut self, moving: Moving<'_>, rows: &mut [BodyRow]) {
         let Continuous { fast, together, parts, .. } = self;
         let count = moving.bodies.len();
@@ -158,7 +160,7 @@ impl Continuous {
         }
     }
 
-    /// The part of the step after which `body` meets something that no impulse moves; 1 if it does not.
+    /// The fraction of the step after which `body` hits a static or kinematic shape; 1 if it does not.
     fn part(&self, moving: Moving<'_>, rows: &[BodyRow], body: usize) -> f32 {
         let own = self.first_shape[body]..self.first_shape[body + 1];
         let mut part = 1.0_f32;
@@ -187,7 +189,8 @@ impl Continuous {
         part
     }
 
-    /// The same with other dynamic bodies; a fast one that a bullet meets stops as well, so that neither passes.
+    /// As [`Self::part`] for other dynamic bodies. A fast body hit by a bullet stops as well, so that neither
+    /// passes the other.
     fn meet_dynamic(&mut self, moving: Moving<'_>, rows: &[BodyRow], bullet: usize) {
         let body = self.fast[bullet].0;
         for shape in self.first_shape[body as usize]..self.first_shape[body as usize + 1] {
@@ -210,7 +213,7 @@ impl Continuous {
     }
 }
 
-/// When in the step shape b meets shape a, before `limit`.
+/// The fraction of the step at which shape b hits shape a, at most `limit`.
 fn pair(moving: Moving<'_>, rows: &[BodyRow], [a, b]: [u32; 2], limit: f32) -> f32 {
     let [body_a, body_b] = [a, b].map(|shape| moving.proxies[shape as usize].body as usize);
     let [pose_a, pose_b] = moving.bodies.relative_poses(body_a, body_b);
@@ -222,7 +225,8 @@ fn pair(moving: Moving<'_>, rows: &[BodyRow], [a, b]: [u32; 2], limit: f32) -> f
     impact(shapes, [&mover(pose_a, body_a), &mover(pose_b, body_b)], moving.slop, limit)
 }
 
-/// Bounds of a shape over the step: those of the disc about its center of mass that holds it however it turns.
+/// Bounds of a shape over the step: those of the disc about its center of mass that contains it at any
+/// rotation.
 fn swept(moving: Moving<'_>, rows: &[BodyRow], shape: usize) -> Aabb {
     let body = moving.proxies[shape].body as usize;
     let reach = moving.shapes[shape].reach();

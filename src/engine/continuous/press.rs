@@ -1,23 +1,23 @@
 //! Stops bodies that are pressed into a static shape before their center enters it.
 //!
-//! Where a piston leaves a body no room, all of its contacts give way, and a body that is past the middle of a wall is
-//! pushed out of it on the other side. What cannot move wins: with the depth d of a contact with a static shape, its
-//! normal n toward the body, the body's way δ over the step and w half its least width,
-//!
+//! If a piston leaves a body no room, all of its contacts yield, and a body past the middle of a wall is
+//! pushed out on the other side. Here the immovable shape wins. With the depth d of a contact with a static
+//! shape, its normal n toward the body, the body's displacement δ over the step and half its smallest width
+//! w,
 //! ```text
 //! d − n·δ ≤ max(w, 2 slop),                                                        (1)
 //! ```
 //!
-//! so that its middle stays on the side that it came from, and it overlaps what presses it instead. The way inward is cut
-//! to what (1) leaves, and the velocity inward goes; nothing is ever pushed out by this. The slop is there for bodies
-//! thinner than what solvers leave as overlap.
+//! so that its middle stays on its side, and the body overlaps the one that presses it instead. The inward
+//! displacement is limited by (1), and the inward velocity is removed; bodies are never pushed out. The slop
+//! term covers bodies thinner than the overlap that solvers leave.
 
 use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::BodyRow;
 use glam::Vec2;
 
-/// Cuts ways into static shapes to (1); `safe_squared` is w² by body.
+/// Limits displacements into static shapes by (1); `safe_squared` is w² by body.
 pub fn hold(bodies: &Bodies, contacts: &[Contact], safe_squared: &[f32], slop: f32, rows: &mut [BodyRow]) {
     for contact in contacts {
         let points = contact.manifold.points().iter();
@@ -55,7 +55,7 @@ mod tests {
         for kind in [BodyKind::Static, BodyKind::Kinematic, BodyKind::Dynamic] {
             bodies.push(&BodyDef::new(kind, [0.0; 2], Vec::new()), &mass);
         }
-        // Half a meter wide on each side; a wall below whose normal is up.
+        // Half a meter wide on each side; the wall is below, with its normal upward.
         let safe = [f32::INFINITY, f32::INFINITY, 0.25];
         let way = |body_a: u32, separation: f32, y: f32| {
             let points = [ManifoldPoint { separation, ..Default::default() }; 2];
@@ -70,7 +70,7 @@ mod tests {
         assert!((y, x) == (-0.04, 1.0) && (v + 2.4).abs() < 1e-6);
         let (y, v, x) = way(0, -0.45, -0.2);
         assert!((y + 0.05).abs() < 1e-6 && v == 0.0 && x == 1.0);
-        // Beyond it already: no deeper, and free to leave.
+        // Already beyond the limit: no deeper, and free to leave.
         assert_eq!(way(0, -0.7, -0.2), (0.0, 0.0, 1.0));
         assert_eq!(way(0, -0.7, 0.2), (0.2, 12.0, 1.0));
         assert_eq!(way(1, -0.7, -0.2), (-0.2, -12.0, 1.0));

@@ -1,4 +1,4 @@
-//! What works along one coordinate of a joint, an angle or a length: spring, motor and limits.
+//! Spring, motor and limits along one coordinate of a joint: an angle or a length.
 
 use super::{Form, check_limits, check_not_negative};
 use crate::engine::bodies::def::finite;
@@ -10,22 +10,22 @@ use crate::engine::lanes::Lanes;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Spring {
-    /// Frequency of the two bodies on it (Hz).
+    /// Natural frequency of the two bodies on the spring (Hz).
     pub hertz: f64,
-    /// Share of critical damping (1).
+    /// Damping ratio (1); 1 is critical.
     pub damping_ratio: f64,
-    /// Coordinate at which it is at rest (rad or m).
+    /// Coordinate at which the spring is relaxed (rad or m).
     #[cfg_attr(feature = "serde", serde(default))]
     pub rest: f64,
 }
 
-/// A motor with a speed and a bound.
+/// A motor with a target speed and bounded torque or force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Motor {
-    /// Speed asked for (rad/s or m/s).
+    /// Target speed (rad/s or m/s).
     pub speed: f64,
-    /// Greatest torque or force (N·m or N).
+    /// Maximum torque or force (N·m or N).
     pub max: f64,
 }
 
@@ -43,7 +43,7 @@ impl Spring {
     }
 }
 
-/// The parts along one coordinate.
+/// The optional parts along one coordinate.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Axial {
     pub spring: Option<Spring>,
@@ -89,7 +89,7 @@ impl Axial {
         }
     }
 
-    /// The rows along the coordinate `value` with Jacobian `j`.
+    /// States the rows along the coordinate `value` with Jacobian `j`.
     #[inline(always)]
     pub fn rows<L: Lanes>(
         form: Form,

@@ -1,4 +1,4 @@
-//! A rod, a rope or a spring between two points.
+//! A rod, rope or spring between two points.
 
 use super::axial::{Axial, Motor, Spring};
 use super::{Definition, Form, JointState, Measured, check_anchors, check_not_negative, excess};
@@ -7,7 +7,7 @@ use crate::engine::constraints::joints::{JointType, Placing};
 use crate::engine::error::Error;
 use crate::engine::lanes::Lanes;
 
-/// Two points at a distance: rigid if there is neither spring nor motor nor limits.
+/// Controls the distance of two points. It is a rigid rod if there is neither spring nor motor nor limits.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -15,17 +15,17 @@ use crate::engine::lanes::Lanes;
     serde(default, deny_unknown_fields)
 )]
 pub struct Distance {
-    /// In the frame of a (m).
+    /// Anchor in the frame of a (m).
     pub anchor_a: [f64; 2],
-    /// In the frame of b (m).
+    /// Anchor in the frame of b (m).
     pub anchor_b: [f64; 2],
-    /// Length of the rod, or of the spring at rest (m).
+    /// Length of the rod, or of the relaxed spring (m).
     pub length: f64,
-    /// Along the line between the points.
+    /// Spring along the line between the points.
     pub spring: Option<Spring>,
-    /// Along the line between the points; a positive speed lengthens.
+    /// Motor along the line between the points; a positive speed lengthens it.
     pub motor: Option<Motor>,
-    /// Least and greatest distance (m): a rope is `[0, length]`.
+    /// Minimum and maximum distance (m); a rope has `[0, length]`.
     pub limits: Option<[f64; 2]>,
 }
 
@@ -35,10 +35,10 @@ impl Distance {
     }
 }
 
-/// Numbers: `[length]`, then what works along the line.
+/// Numbers: `[length]`, then the parts along the line.
 const FRAME: usize = 1;
 
-/// Points that are nearer than this have no line between them (m).
+/// Points closer than this have no line between them (m).
 const NO_LINE: f32 = 1e-9;
 
 impl JointType for Distance {
@@ -61,7 +61,7 @@ impl JointType for Distance {
 
     fn place(&self, _form: Form, at: Placing<'_>, numbers: &mut [f32]) {
         numbers[0] = self.length as f32;
-        // A spring is at rest at the length, limits are of the distance.
+        // Parts measure from the length, but limits are given as distances.
         let limits = self.limits.map(|limits| limits.map(|x| x - self.length));
         Axial { limits, ..self.axial() }.place(at.h, &mut numbers[FRAME..]);
     }

@@ -1,4 +1,4 @@
-//! Joints: what they are and what they are made of. One file per type; `constraints/joints` solves them.
+//! Joints and their parameters, one file per type. `constraints/joints` solves them.
 //!
 //! ```
 //! # use simpulse_engine as simpulse;
@@ -41,7 +41,7 @@ use crate::engine::constraints::joints::JointType;
 use crate::engine::error::Error;
 use glam::{DVec2, Vec2};
 
-/// Name of a joint, valid until it is removed.
+/// Identifies a joint of a world; valid until the joint is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct JointHandle {
     pub(crate) index: u32,
@@ -49,7 +49,7 @@ pub struct JointHandle {
 }
 
 impl JointHandle {
-    /// Place among all joints that a world has had.
+    /// Index among the joints of the world; reused after the joint is removed.
     pub fn index(self) -> usize {
         self.index as usize
     }
@@ -59,22 +59,23 @@ impl JointHandle {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Joint {
-    /// The body in whose frame axes are.
+    /// The first body; axes are fixed in its frame.
     pub a: BodyHandle,
-    /// The other one.
+    /// The second body.
     pub b: BodyHandle,
     /// Whether the two bodies collide with each other.
     pub collide_connected: bool,
-    /// Load from which on [`JointState::breaks`] is set (N, N·m); joints do not break by themselves.
+    /// Force and torque above which [`JointState::breaks`] is set (N, N·m). Joints do not break by
+    /// themselves.
     pub break_load: Option<[f64; 2]>,
-    /// Points of the world (m) where the anchors of a and b are, from which frames are taken as the joint is added; none
-    /// if they are as `kind` has them.
+    /// World positions of the anchors of a and b (m), converted to the bodies' frames when the joint is
+    /// added; `None` if `kind` already has its frames.
     pub at: Option<[[f64; 2]; 2]>,
-    /// What it holds.
+    /// Type of the joint, with its values.
     pub kind: JointKind,
 }
 
-/// What a joint holds.
+/// Type of a joint, with its values.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum JointKind {
@@ -82,26 +83,26 @@ pub enum JointKind {
     Revolute(Revolute),
     /// A slider.
     Prismatic(Prismatic),
-    /// A rod, a rope or a spring between two points.
+    /// A rod, rope or spring between two points.
     Distance(Distance),
-    /// No motion.
+    /// A connection in position and angle, rigid or soft.
     Weld(Weld),
-    /// A slider with a hinge: the suspension of a wheel.
+    /// A slider with a hinge: a wheel on its suspension.
     Wheel(Wheel),
-    /// A drive to a pose, of bounded force.
+    /// A drive to a relative pose, with bounded force and torque.
     Motor(MotorJoint),
-    /// A spring to a point of the world.
+    /// A spring from a point of b to a target point.
     Mouse(Mouse),
-    /// Nothing: the bodies do not collide.
+    /// No constraint: the two bodies just do not collide.
     Filter,
 }
 
-/// Which rows the joints of a group have besides those of their type.
+/// Optional rows that the joints of a group have.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Form {
-    /// A spring; of a weld, that of its linear rows.
+    /// A spring; for a weld, its linear spring.
     pub spring: bool,
-    /// A motor; of a weld, the spring of its angle.
+    /// A motor; for a weld, its angular spring.
     pub motor: bool,
     /// Limits.
     pub limits: bool,
@@ -110,46 +111,47 @@ pub struct Form {
 /// State of a joint after a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointState {
-    /// Size of the error of what is held along a line (m).
+    /// Position error of the rigid rows (m).
     pub gap: f64,
-    /// Error of the angle, where it is held (rad).
+    /// Angle error of the rigid rows (rad).
     pub lean: f64,
-    /// Angle of b against a from the reference, counted on from turn to turn (rad).
+    /// Angle of b relative to a, from the reference angle (rad); it counts full turns.
     pub angle: f64,
-    /// Way of b's anchor along the axis, or length of the joint (m).
+    /// Displacement of b's anchor along the axis, or distance between the anchors of a joint without an axis
+    /// (m); 0 for hinges.
     pub translation: f64,
     /// How far limits are exceeded (m or rad); 0 within them.
     pub excess: f64,
-    /// Force (N) and torque (N·m) of the last substep.
+    /// Magnitudes of the force (N) and torque (N·m) in the last substep.
     pub load: [f64; 2],
-    /// Whether the load is above [`Joint::break_load`].
+    /// Whether the load exceeds [`Joint::break_load`].
     pub breaks: bool,
 }
 
-/// Poses of the two bodies of a joint.
+/// Relative pose of the two bodies of a joint.
 #[derive(Clone, Copy, Debug)]
 pub struct Measured {
-    /// From a's anchor to b's (m).
+    /// Vector from a's anchor to b's (m).
     pub way: DVec2,
     /// Rotation of a, as a unit vector.
     pub rotation_a: DVec2,
-    /// Angle of b against a (rad), counted on.
+    /// Angle of b relative to a, from the reference angle (rad); it counts full turns.
     pub angle: f64,
 }
 
-/// What every type of joint says of itself besides its rows.
+/// Properties of a joint type other than its rows.
 pub(crate) trait Definition: JointType<Form = Form> {
-    /// Which rows it has.
+    /// The optional rows it has.
     fn form(&self) -> Form;
-    /// Whether its values are within their ranges.
+    /// Errors: a value out of range.
     fn check(&self) -> Result<(), Error>;
-    /// [`JointType::anchors`], to write.
+    /// Mutable [`JointType::anchors`].
     fn anchors_mut(&mut self) -> [&mut [f64; 2]; 2];
-    /// Takes angle (rad) and length (m) between bodies as they are for its reference.
+    /// Sets the reference values to the current angle (rad) and distance of the anchors (m).
     fn refer(&mut self, _angle: f64, _length: f64) {}
-    /// Its errors.
+    /// The joint's state at these poses, without its load.
     fn measure(&self, at: &Measured) -> JointState;
-    /// Impulses of force (N·s) and of torque (N·m·s) among its kept numbers.
+    /// Magnitudes of the linear (N·s) and angular (N·m·s) impulse, from its kept numbers.
     fn load(&self, kept: &[f32]) -> [f64; 2];
 }
 
@@ -170,7 +172,7 @@ macro_rules! of_kind {
 pub(crate) use of_kind;
 
 impl JointKind {
-    /// Its name in files.
+    /// Name in files.
     pub fn name(&self) -> &'static str {
         match self {
             JointKind::Revolute(_) => "revolute",
@@ -184,12 +186,12 @@ impl JointKind {
         }
     }
 
-    /// Errors: a value out of its range, with its place.
+    /// Errors: a value out of range, with its path.
     pub fn check(&self) -> Result<(), Error> {
         of_kind!(self, joint => joint.check().map_err(|e| e.within(self.name())), else Ok(()))
     }
 
-    /// Which rows it has.
+    /// The optional rows it has.
     pub fn form(&self) -> Form {
         of_kind!(self, joint => joint.form(), else Form::default())
     }
@@ -209,7 +211,7 @@ impl JointKind {
 }
 
 impl Joint {
-    /// A joint of this kind between two bodies that do not collide.
+    /// A joint of kind `kind`; its two bodies do not collide with each other.
     pub fn new(a: BodyHandle, b: BodyHandle, kind: JointKind) -> Self {
         Joint { a, b, collide_connected: false, break_load: None, at: None, kind }
     }
@@ -219,54 +221,56 @@ impl Joint {
         Joint::new(a, b, JointKind::Revolute(Revolute::default()))
     }
 
-    /// A slider along `axis`, in the frame of a.
+    /// A slider along `axis`, given in the frame of a.
     pub fn prismatic(a: BodyHandle, b: BodyHandle, axis: [f64; 2]) -> Self {
         Joint::new(a, b, JointKind::Prismatic(Prismatic { axis, ..Prismatic::default() }))
     }
 
-    /// A rod between two points of the world (m).
+    /// A rod between two points, given in world coordinates (m).
     pub fn distance(a: BodyHandle, b: BodyHandle, points: [[f64; 2]; 2]) -> Self {
         Joint { at: Some(points), ..Joint::new(a, b, JointKind::Distance(Distance::default())) }
     }
 
-    /// No motion of b against a.
+    /// A weld: b does not move relative to a.
     pub fn weld(a: BodyHandle, b: BodyHandle) -> Self {
         Joint::new(a, b, JointKind::Weld(Weld::default()))
     }
 
-    /// A wheel b with a suspension along `axis`, in the frame of a.
+    /// A wheel b with a suspension along `axis`, given in the frame of a.
     pub fn wheel(a: BodyHandle, b: BodyHandle, axis: [f64; 2]) -> Self {
         Joint::new(a, b, JointKind::Wheel(Wheel { axis, ..Wheel::default() }))
     }
 
-    /// A drive of bounded force (N) and torque (N·m) to the pose that b has against a.
+    /// A drive, of bounded force (N) and torque (N·m), to a pose of b relative to a.
     pub fn motor_joint(a: BodyHandle, b: BodyHandle, max_force: f64, max_torque: f64) -> Self {
         Joint::new(a, b, JointKind::Motor(MotorJoint { max_force, max_torque, ..MotorJoint::default() }))
     }
 
-    /// A spring of bounded force (N) from `point` of the world on body b to a target, at first the same; a is a body
-    /// that does not move.
+    /// A spring of bounded force (N) that pulls the world point `point` of body b to a target. The target
+    /// starts at `point`. Body a should not move.
     pub fn mouse(a: BodyHandle, b: BodyHandle, point: [f64; 2], max_force: f64) -> Self {
         let mouse = Mouse { target: point, max_force, ..Mouse::default() };
         Joint { at: Some([point; 2]), ..Joint::new(a, b, JointKind::Mouse(mouse)) }
     }
 
-    /// Two bodies that do not collide.
+    /// No constraint: the two bodies just do not collide.
     pub fn filter(a: BodyHandle, b: BodyHandle) -> Self {
         Joint::new(a, b, JointKind::Filter)
     }
 
-    /// At this point of the world (m), at the angle that the bodies have.
+    /// Places both anchors at a world point (m). The angle of the bodies when the joint is added is the
+    /// reference.
     pub fn anchor(self, point: [f64; 2]) -> Self {
         Joint { at: Some([point; 2]), ..self }
     }
 
-    /// The two bodies collide.
+    /// Lets the two bodies collide with each other.
     pub fn colliding(self) -> Self {
         Joint { collide_connected: true, ..self }
     }
 
-    /// Within limits of the angle (rad), the way along the axis (m) or the length (m), where the kind has them.
+    /// Sets limits of the angle (rad), of the displacement along the axis (m) or of the length (m). Kinds
+    /// without limits ignore it.
     pub fn limits(mut self, lower: f64, upper: f64) -> Self {
         let limits = Some([lower, upper]);
         match &mut self.kind {
@@ -279,7 +283,8 @@ impl Joint {
         self
     }
 
-    /// With a motor of this speed (rad/s or m/s) and greatest torque or force (N·m or N), where the kind has one.
+    /// Sets the speed (rad/s or m/s) and maximum torque or force (N·m or N) of the motor. Kinds without a
+    /// motor ignore it.
     pub fn motor(mut self, speed: f64, max: f64) -> Self {
         let motor = Some(Motor { speed, max });
         match &mut self.kind {
@@ -292,7 +297,7 @@ impl Joint {
         self
     }
 
-    /// With a spring of this frequency (Hz) and damping ratio, where the kind has one.
+    /// Sets the frequency (Hz) and damping ratio (1) of the springs. A filter ignores it.
     pub fn spring(mut self, hertz: f64, damping_ratio: f64) -> Self {
         let spring = Spring { hertz, damping_ratio, rest: 0.0 };
         match &mut self.kind {
@@ -308,7 +313,7 @@ impl Joint {
         self
     }
 
-    /// Takes frames from the points of the world that were given.
+    /// The joint with its frames computed from the world points in `at`.
     pub(crate) fn placed(&self, bodies: &Bodies) -> Joint {
         let mut joint = self.clone();
         let Some(points) = joint.at.take() else { return joint };
@@ -330,7 +335,7 @@ impl Joint {
     }
 }
 
-/// Poses of the ends of a joint, from full positions.
+/// Relative pose of the ends of a joint, from full-precision positions.
 pub(crate) fn measured(bodies: &Bodies, ends: [usize; 2], anchors: [[f64; 2]; 2], angle: f64) -> Measured {
     let anchor = |k: usize| {
         let pose = bodies.pose(ends[k]);
@@ -340,12 +345,12 @@ pub(crate) fn measured(bodies: &Bodies, ends: [usize; 2], anchors: [[f64; 2]; 2]
     Measured { way: anchor(1) - anchor(0), rotation_a: bodies.pose(ends[0]).rotation.as_dvec2(), angle }
 }
 
-/// How far `value` is beyond `limits`.
+/// How far `value` exceeds `limits`.
 fn excess(limits: Option<[f64; 2]>, value: f64) -> f64 {
     limits.map_or(0.0, |[lower, upper]| (lower - value).max(value - upper).max(0.0))
 }
 
-/// `axis` (1) as a unit vector.
+/// `axis`, normalized.
 fn unit(axis: [f64; 2]) -> Vec2 {
     DVec2::from(axis).normalize_or_zero().as_vec2()
 }

@@ -1,4 +1,4 @@
-//! A drive to a pose: springs of bounded force and torque.
+//! A drive to a relative pose: springs of bounded force and torque.
 
 use super::axial::Spring;
 use super::{Definition, Form, JointState, Measured, check_anchors, check_not_negative};
@@ -8,7 +8,7 @@ use crate::engine::constraints::joints::{JointType, Placing};
 use crate::engine::error::Error;
 use crate::engine::lanes::Lanes;
 
-/// A drive of b to a pose against a.
+/// Drives b to a pose relative to a.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -16,17 +16,17 @@ use crate::engine::lanes::Lanes;
     serde(default, deny_unknown_fields)
 )]
 pub struct MotorJoint {
-    /// In the frame of a (m): where b's anchor is to go.
+    /// Target of b's anchor, in the frame of a (m).
     pub anchor_a: [f64; 2],
-    /// In the frame of b (m).
+    /// Anchor in the frame of b (m).
     pub anchor_b: [f64; 2],
-    /// Angle of b against a to go to (rad).
+    /// Target angle of b relative to a (rad).
     pub angle: f64,
-    /// How it goes there.
+    /// The springs that drive it.
     pub spring: Spring,
-    /// Greatest force (N).
+    /// Maximum force (N).
     pub max_force: f64,
-    /// Greatest torque (N·m).
+    /// Maximum torque (N·m).
     pub max_torque: f64,
 }
 

@@ -1,4 +1,4 @@
-//! A spring of bounded force to a point of the world.
+//! A spring of bounded force to a target point.
 
 use super::axial::Spring;
 use super::{Definition, Form, JointState, Measured, check_not_negative};
@@ -8,7 +8,7 @@ use crate::engine::constraints::joints::{JointType, Placing};
 use crate::engine::error::Error;
 use crate::engine::lanes::Lanes;
 
-/// Pulls a point of b to a target, which may be changed between steps. Body a does not move.
+/// Pulls a point of b to a target, which may be changed between steps. Body a should not move.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -18,11 +18,11 @@ use crate::engine::lanes::Lanes;
 pub struct Mouse {
     /// The target, in the frame of a (m).
     pub target: [f64; 2],
-    /// In the frame of b (m).
+    /// The pulled point, in the frame of b (m).
     pub anchor_b: [f64; 2],
-    /// How it pulls.
+    /// The spring that pulls.
     pub spring: Spring,
-    /// Greatest force (N).
+    /// Maximum force (N).
     pub max_force: f64,
 }
 

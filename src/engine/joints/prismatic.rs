@@ -1,4 +1,4 @@
-//! A slider: b moves along an axis of a and does not turn against it.
+//! A slider: b moves along an axis of a and does not turn relative to it.
 
 use super::axial::{Axial, Motor, Spring};
 use super::{Definition, Form, JointState, Measured, check_anchors, check_axis, excess, unit};
@@ -9,7 +9,7 @@ use crate::engine::error::Error;
 use crate::engine::lanes::Lanes;
 use glam::DVec2;
 
-/// A slider with spring, motor and limits along its axis.
+/// A slider, optionally with spring, motor and limits along its axis.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -17,19 +17,19 @@ use glam::DVec2;
     serde(default, deny_unknown_fields)
 )]
 pub struct Prismatic {
-    /// In the frame of a (m).
+    /// Anchor in the frame of a (m).
     pub anchor_a: [f64; 2],
-    /// In the frame of b (m).
+    /// Anchor in the frame of b (m).
     pub anchor_b: [f64; 2],
-    /// Direction in the frame of a; any length.
+    /// Direction of the slider in the frame of a, of any length.
     pub axis: [f64; 2],
-    /// Angle of b against a (rad).
+    /// Angle of b relative to a (rad).
     pub reference_angle: f64,
-    /// Along the axis.
+    /// Spring along the axis.
     pub spring: Option<Spring>,
-    /// Along the axis.
+    /// Motor along the axis.
     pub motor: Option<Motor>,
-    /// Of the way along the axis (m).
+    /// Lower and upper limit of the displacement along the axis (m).
     pub limits: Option<[f64; 2]>,
 }
 
@@ -53,12 +53,13 @@ impl Prismatic {
     }
 }
 
-/// Numbers: `[axis, angle]`, then what works along the axis.
+/// Numbers: `[axis, angle]`, then the parts along the axis.
 const FRAME: usize = 3;
 
-/// The rows along `axis` and along t = (−axis_y, axis_x), the way in both directions, and the direction t.
+/// Jacobians of the rows along `axis` and along t = (−axis_y, axis_x), and the displacement in both
+/// directions.
 ///
-/// The axis turns with a, so that a's arm goes on to the anchor of b: (r_a + way) × d.
+/// The axis turns with a, so a's arm reaches to the anchor of b: (r_a + way) × d.
 #[inline(always)]
 pub(super) fn along_and_across<L: Lanes>(numbers: &[L], on: &JointPair<L>) -> ([Jacobian<L>; 2], [L; 2]) {
     let ([ra, rb], way) = on.anchors();

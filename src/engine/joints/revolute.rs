@@ -1,4 +1,4 @@
-//! A hinge: two points stay together.
+//! A hinge: the anchors of the two bodies coincide.
 
 use super::axial::{Axial, Motor, Spring};
 use super::{Definition, Form, JointState, Measured, check_anchors, excess};
@@ -8,7 +8,7 @@ use crate::engine::constraints::joints::{JointType, Placing};
 use crate::engine::error::Error;
 use crate::engine::lanes::Lanes;
 
-/// A hinge with spring, motor and limits of the angle.
+/// A hinge, optionally with spring, motor and limits of the angle.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -16,17 +16,17 @@ use crate::engine::lanes::Lanes;
     serde(default, deny_unknown_fields)
 )]
 pub struct Revolute {
-    /// In the frame of a (m).
+    /// Anchor in the frame of a (m).
     pub anchor_a: [f64; 2],
-    /// In the frame of b (m).
+    /// Anchor in the frame of b (m).
     pub anchor_b: [f64; 2],
-    /// Angle of b against a that counts as zero (rad).
+    /// Angle of b relative to a that counts as zero (rad).
     pub reference_angle: f64,
-    /// Of the angle.
+    /// Spring on the angle.
     pub spring: Option<Spring>,
-    /// Of the angle.
+    /// Motor on the angle.
     pub motor: Option<Motor>,
-    /// Of the angle (rad).
+    /// Lower and upper limit of the angle (rad).
     pub limits: Option<[f64; 2]>,
 }
 

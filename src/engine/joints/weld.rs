@@ -1,4 +1,4 @@
-//! A weld: b does not move against a, or only as springs let it.
+//! A weld: b does not move relative to a, except as far as springs give way.
 
 use super::axial::Spring;
 use super::{Definition, Form, JointState, Measured, check_anchors};
@@ -8,7 +8,7 @@ use crate::engine::constraints::joints::{JointType, Placing};
 use crate::engine::error::Error;
 use crate::engine::lanes::Lanes;
 
-/// A weld, rigid or soft, in places and in the angle apart.
+/// A weld, rigid or soft. Position and angle have separate springs.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -16,15 +16,15 @@ use crate::engine::lanes::Lanes;
     serde(default, deny_unknown_fields)
 )]
 pub struct Weld {
-    /// In the frame of a (m).
+    /// Anchor in the frame of a (m).
     pub anchor_a: [f64; 2],
-    /// In the frame of b (m).
+    /// Anchor in the frame of b (m).
     pub anchor_b: [f64; 2],
-    /// Angle of b against a (rad).
+    /// Angle of b relative to a (rad).
     pub reference_angle: f64,
-    /// Between the anchors; rigid without.
+    /// Spring between the anchors; `None` is rigid.
     pub linear: Option<Spring>,
-    /// Of the angle; rigid without.
+    /// Spring on the angle; `None` is rigid.
     pub angular: Option<Spring>,
 }
 

@@ -1,4 +1,4 @@
-//! A wheel: b turns and moves along an axis of a.
+//! A wheel: b turns freely and moves along an axis of a.
 
 use super::axial::{Axial, Motor, Spring};
 use super::prismatic::along_and_across;
@@ -9,7 +9,7 @@ use crate::engine::error::Error;
 use crate::engine::lanes::Lanes;
 use glam::DVec2;
 
-/// A wheel with a suspension along its axis and a motor.
+/// A wheel, optionally with a suspension along its axis and a motor.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -17,17 +17,17 @@ use glam::DVec2;
     serde(default, deny_unknown_fields)
 )]
 pub struct Wheel {
-    /// In the frame of a (m).
+    /// Anchor in the frame of a (m).
     pub anchor_a: [f64; 2],
-    /// In the frame of b (m).
+    /// Anchor in the frame of b (m).
     pub anchor_b: [f64; 2],
-    /// Direction of the suspension in the frame of a; any length.
+    /// Direction of the suspension in the frame of a, of any length.
     pub axis: [f64; 2],
-    /// The suspension.
+    /// Spring of the suspension.
     pub spring: Option<Spring>,
-    /// Of the angle.
+    /// Motor that turns the wheel.
     pub motor: Option<Motor>,
-    /// Of the way along the axis (m).
+    /// Lower and upper limit of the displacement along the axis (m).
     pub limits: Option<[f64; 2]>,
 }
 
@@ -48,7 +48,7 @@ impl Wheel {
     }
 }
 
-/// The parts of a form along the axis, and of the angle.
+/// Splits a form into its parts along the axis and on the angle.
 const fn split(form: Form) -> [Form; 2] {
     let Form { spring, motor, limits } = form;
     [Form { spring, motor: false, limits }, Form { spring: false, motor, limits: false }]

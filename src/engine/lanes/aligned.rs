@@ -1,4 +1,4 @@
-//! A growable array of `f32` that is 64-byte aligned and castable to lanes of any width.
+//! A growable array of `f32` with 64-byte alignment, castable to lanes of any width.
 
 use bytemuck::{Pod, Zeroable};
 use std::ops::{Deref, DerefMut};
@@ -8,7 +8,7 @@ use std::ops::{Deref, DerefMut};
 #[repr(C, align(64))]
 pub struct Block(pub [f32; 16]);
 
-/// `len` floats in 64-byte blocks; what lies past `len` in the last block is zero.
+/// `len` floats in 64-byte blocks; floats past `len` in the last block are zero.
 #[derive(Clone, Debug, Default)]
 pub struct LaneVec {
     blocks: Vec<Block>,
@@ -21,7 +21,7 @@ impl LaneVec {
         self.len
     }
 
-    /// Whether there are none.
+    /// Whether the array is empty.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -35,7 +35,7 @@ impl LaneVec {
         self.len += 1;
     }
 
-    /// Sets the length; new floats are zero, capacity is kept.
+    /// Sets the length. New floats are zero; capacity is kept.
     pub fn resize(&mut self, len: usize) {
         if len < self.len {
             self[len..].fill(0.0);
@@ -44,7 +44,7 @@ impl LaneVec {
         self.len = len;
     }
 
-    /// The floats as lanes, the last vector filled up with zeros.
+    /// The floats as lanes; the last vectors are padded with zeros.
     pub fn lanes<L: Pod>(&self) -> &[L] {
         bytemuck::cast_slice(&self.blocks)
     }
@@ -54,13 +54,13 @@ impl LaneVec {
         bytemuck::cast_slice_mut(&mut self.blocks)
     }
 
-    /// Bytes held.
+    /// Allocated bytes.
     pub fn bytes(&self) -> usize {
         self.blocks.capacity() * 64
     }
 }
 
-/// Bytes that an array holds, in use or not.
+/// Allocated bytes of an array, used or not.
 pub fn held<T>(array: &Vec<T>) -> usize {
     array.capacity() * size_of::<T>()
 }

@@ -1,11 +1,11 @@
-//! One lane that counts what is done to it: floating-point operations are measured, not guessed.
+//! One lane that counts its operations, so that floating-point operations are measured instead of estimated.
 //!
-//! The kernels are written once for any [`Lanes`]; run with [`Counted`] they do on one lane what
-//! they do on sixteen, and every operation is booked. A thread has one book.
+//! The kernels are generic over [`Lanes`]. With [`Counted`] they perform on one lane the same operations as
+//! on sixteen, and every operation is counted. Counts are per thread.
 //!
-//! Counts follow the source. A compiler removes dead code: in a sweep the tangential part of a motion (3 of some 140
-//! operations against a dynamic body), and against a static one also the sine and versine of its turn (10 of some
-//! 100).
+//! Counts follow the source, although a compiler removes dead code. In a sweep that is the tangential part of
+//! a motion (3 of some 140 operations against a dynamic body), and against a static body also the sine and
+//! versine of its rotation (10 of some 100).
 
 use super::index::LaneIndex;
 use super::quads::Quad;
@@ -26,13 +26,13 @@ pub struct Operations {
     pub multiply_adds: u64,
     /// Divisions and square roots.
     pub divisions: u64,
-    /// Minima, maxima and selections: no floating-point operations, but instructions.
+    /// Minima, maxima and selections: instructions, but not floating-point operations.
     pub choices: u64,
 }
 
 impl Operations {
-    /// Floating-point operations: a multiply-add is two, a division or root one; choices and changes
-    /// of sign are none.
+    /// Floating-point operations. A multiply-add counts as two, a division or root as one; selections and
+    /// sign changes do not count.
     pub fn flops(&self) -> u64 {
         self.adds + self.multiplies + 2 * self.multiply_adds + self.divisions
     }
@@ -52,7 +52,7 @@ enum OperationKind {
     Choose,
 }
 
-// A call for every operation: inlined, the kernels that count were half of all code of all kernels.
+// Not inlined: inlined, the counting kernels made up half of the code of all kernels.
 #[inline(never)]
 fn book(kind: OperationKind) {
     let mut operations = BOOK.get();
@@ -67,13 +67,13 @@ fn book(kind: OperationKind) {
     BOOK.set(operations);
 }
 
-/// An `f32` that counts. Results have the bits of `f32`.
+/// An `f32` that counts its operations. Results have the bits of `f32`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(transparent)]
 pub struct Counted(pub f32);
 
 impl Counted {
-    /// Operations of this thread since the last call.
+    /// Operations of this thread since the last call. Resets the counts.
     pub fn take() -> Operations {
         BOOK.take()
     }

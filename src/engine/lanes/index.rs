@@ -1,19 +1,19 @@
-//! Indices with a bound: what gathers and scatters go by.
+//! Index lists with a bound, used by gathers and scatters.
 //!
-//! A gather reads `rows[index[lane]]` in all lanes at once and checks no lane by itself. It checks that
-//! the **bound** of the indices does not exceed the number of rows, which is one comparison, the same for
-//! all batches of a list. What makes that enough is the invariant of the three types below: *every
-//! entry is less than the bound*. Their fields are private, entries are only added by what raises
-//! the bound with them, and nothing lends an entry to be changed. This file is safe code; the
-//! unsafe code of [`super::quads`] and [`super::rows`] rests on it and on nothing else.
+//! A gather reads `rows[index[lane]]` in all lanes at once and does not check single lanes. It checks that
+//! the **bound** of the indices does not exceed the number of rows: one comparison, the same for all batches
+//! of a list. This suffices because of an invariant of the three types below: *every entry is less than the
+//! bound*. Their fields are private, adding entries also raises the bound, and no entry can be modified from
+//! outside. This file is safe code; the unsafe code of [`super::quads`] and [`super::rows`] relies on this
+//! invariant alone.
 
 use bytemuck::Pod;
 use std::ops::{Deref, Range};
 
-/// Where the entries of `list` end: one more than the largest. No slice of anything is so long that
-/// the saturated bound of `u32::MAX` fits where addresses have 32 bits.
+/// The bound of `list`: one more than its largest entry. If the bound of `u32::MAX` saturates (32-bit
+/// addresses), no slice is long enough to satisfy it.
 fn bound_of(list: &[u32]) -> usize {
-    // Found in lanes, where a search for the first bad entry would not be.
+    // This fold vectorizes; a search for the first bad entry would not.
     let largest = list.iter().fold(0, |most, &i| i.max(most));
     if list.is_empty() { 0 } else { (largest as usize).saturating_add(1) }
 }
@@ -26,7 +26,7 @@ pub struct Indices {
 }
 
 impl Indices {
-    /// Empties the list; its memory is kept.
+    /// Empties the list but keeps its memory.
     pub fn clear(&mut self) {
         self.entries.clear();
         self.bound = 0;
@@ -38,7 +38,7 @@ impl Indices {
         self.entries.extend_from_slice(entries);
     }
 
-    /// Appends `index` until there are `len` entries. A longer list stays as it is.
+    /// Appends `index` until there are `len` entries. A longer list is unchanged.
     pub fn fill_to(&mut self, len: usize, index: u32) {
         if len > self.entries.len() {
             self.bound = self.bound.max(bound_of(&[index]));
@@ -51,7 +51,7 @@ impl Indices {
         IndexList { entries: &self.entries, bound: self.bound }
     }
 
-    /// Bytes held.
+    /// Allocated bytes.
     pub fn held_bytes(&self) -> usize {
         super::held(&self.entries)
     }
@@ -72,12 +72,12 @@ pub struct IndexList<'a> {
 }
 
 impl<'a> IndexList<'a> {
-    /// Finds the bound of `entries`.
+    /// A list with the bound of `entries`.
     pub fn new(entries: &'a [u32]) -> Self {
         IndexList { entries, bound: bound_of(entries) }
     }
 
-    /// Every entry is less.
+    /// Upper bound: every entry is less.
     #[inline(always)]
     pub fn bound(self) -> usize {
         self.bound
@@ -92,23 +92,23 @@ impl<'a> IndexList<'a> {
     /// A part of the list.
     ///
     /// # Panics
-    /// If the list does not have it.
+    /// If the range exceeds the list.
     #[inline(always)]
     pub fn part(self, range: Range<usize>) -> Self {
         IndexList { entries: &self.entries[range], bound: self.bound }
     }
 
-    /// The entries of batch `batch` of `width` lanes: fewer, or none, where the list ends before.
+    /// The entries of batch `batch` of `width` lanes. Shorter or empty at the end of the list.
     #[inline(always)]
     pub fn entries_of(self, batch: usize, width: usize) -> &'a [u32] {
         let (first, len) = (batch * width, self.entries.len());
         self.entries.get(first..(first + width).min(len)).unwrap_or(&[])
     }
 
-    /// The list batch by batch.
+    /// The list, batch by batch.
     ///
     /// # Panics
-    /// If the last batch is not whole.
+    /// If the last batch is incomplete.
     #[inline(always)]
     pub fn batches<I: Pod>(self) -> impl ExactSizeIterator<Item = LaneIndex<'a, I>> {
         let bound = self.bound;
@@ -118,14 +118,14 @@ impl<'a> IndexList<'a> {
     /// One batch of the list.
     ///
     /// # Panics
-    /// If the last batch is not whole, or before this one.
+    /// If the last batch is incomplete, or the list has no such batch.
     #[inline(always)]
     pub fn batch<I: Pod>(self, batch: usize) -> LaneIndex<'a, I> {
         LaneIndex { entries: &bytemuck::cast_slice(self.entries)[batch], bound: self.bound }
     }
 
-    /// The batch that begins at entry `first`. If the list ends before the batch does, it is made in
-    /// `room` and filled up with that entry.
+    /// The batch that begins at entry `first`. If the list ends within the batch, the batch is built in
+    /// `room` and padded with entry `first`.
     ///
     /// # Panics
     /// If there is no entry `first`.
@@ -145,7 +145,7 @@ impl<'a> IndexList<'a> {
     }
 }
 
-/// The most lanes that there are.
+/// The largest number of lanes.
 pub const MOST_LANES: usize = 16;
 
 /// The beginning of `list` as one batch.
@@ -162,20 +162,20 @@ pub struct LaneIndex<'a, I> {
 }
 
 impl<'a, I: Pod> LaneIndex<'a, I> {
-    /// The first entries of `list`, as many as there are lanes; finds their bound.
+    /// The first entries of `list`, one per lane, with their bound.
     #[inline(always)]
     pub fn new(list: &'a [u32; MOST_LANES]) -> Self {
         let entries = first_of::<I>(list);
         LaneIndex { entries, bound: bound_of(bytemuck::cast_slice(std::slice::from_ref(entries))) }
     }
 
-    /// Every entry is less.
+    /// Upper bound: every entry is less.
     #[inline(always)]
     pub fn bound(self) -> usize {
         self.bound
     }
 
-    /// The entries, an array.
+    /// The entries as an array.
     #[inline(always)]
     pub fn array(self) -> &'a I {
         self.entries
@@ -187,7 +187,7 @@ impl<'a, I: Pod> LaneIndex<'a, I> {
         bytemuck::cast_slice(std::slice::from_ref(self.entries))
     }
 
-    /// The one index in all lanes, if there is only one.
+    /// The index shared by all lanes, or `None` if they differ.
     #[inline(always)]
     pub fn only(self) -> Option<usize> {
         let entries = self.entries();
@@ -205,10 +205,10 @@ impl<'a, const W: usize> LaneIndex<'a, [u32; W]> {
     }
 }
 
-/// Whether records of `stride` parts each, `parts` in all, are as many as `bound` requires.
+/// Checks that there are at least `bound` records of `stride` parts each, given `parts` in total.
 ///
 /// # Panics
-/// If not.
+/// If there are fewer.
 #[inline(always)]
 pub(super) fn assert_fits(bound: usize, parts: usize, stride: usize) {
     if bound > parts / stride {

@@ -1,13 +1,14 @@
 //! Lanes: the vector operations that kernels need, at widths 1, 4, 8 and 16.
 //!
-//! One trait, [`Lanes`], has exactly the operations that kernels use, so that a kernel is written once and compiled
+//! One trait, [`Lanes`], has exactly the operations that kernels use. A kernel is written once and compiled
 //! at every width, with the same bits in each lane.
 //!
-//! Kernels gather and scatter by [`LaneIndex`], indices with a checked bound; an index out of bounds panics. The
-//! unsafe code for this is in `quads.rs` and `rows.rs`, and does not depend on implementations of [`Lanes`].
+//! Kernels gather and scatter by [`LaneIndex`], a set of indices with a checked bound; an index out of bounds
+//! panics. The unsafe code for this is in `quads.rs` and `rows.rs`. Its soundness does not depend on
+//! implementations of [`Lanes`].
 //!
-//! The target CPU of the build decides which instructions a width uses; [`native_width`] is the widest that is not
-//! emulated.
+//! The target CPU of the build decides which instructions a width uses; [`native_width`] is the widest that
+//! is not emulated.
 
 mod aligned;
 mod counted;

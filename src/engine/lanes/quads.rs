@@ -1,9 +1,9 @@
-//! Gather and scatter of quads: 16 aligned bytes out of records that lie anywhere.
+//! Gather and scatter of quads: 16 aligned bytes from records anywhere in memory.
 //!
-//! A record is `STRIDE` quads; quad `OFFSET` of `W` records is loaded and transposed in
-//! registers. The transposes stay inside 128-bit lanes: 128-bit lane `q` of vector `k` is loaded
-//! from record `4q + k`, so that one 4 × 4 transpose of each 128-bit lane (8 shuffles for any
-//! width) puts component `c` of records `0..W`, in order, into vector `c`.
+//! A record has `STRIDE` quads. Quad `OFFSET` of `W` records is loaded and transposed in registers. The
+//! transposes stay inside 128-bit lanes: 128-bit lane `q` of vector `k` is loaded from record `4q + k`. One 4
+//! × 4 transpose of each 128-bit lane (8 shuffles for any width) then puts component `c` of records `0..W`,
+//! in order, into vector `c`.
 
 #![allow(
     unsafe_code,
@@ -14,7 +14,7 @@ use super::index::{LaneIndex, assert_fits};
 use bytemuck::{Pod, Zeroable};
 use wide::{f32x4, f32x8, f32x16};
 
-/// Four floats, aligned to be one load.
+/// Four floats, aligned for a single load.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub struct Quad(pub [f32; 4]);
@@ -30,7 +30,7 @@ unsafe fn at<const STRIDE: usize, const OFFSET: usize>(quads: &[Quad], i: u32) -
     unsafe { quads.as_ptr().add(i as usize * STRIDE + OFFSET).cast() }
 }
 
-/// As [`at`], to write.
+/// As [`at`], for writing.
 ///
 /// # Safety
 /// `i * STRIDE + OFFSET < quads.len()`.
@@ -41,7 +41,7 @@ unsafe fn at_mut<const STRIDE: usize, const OFFSET: usize>(quads: &mut [Quad], i
     unsafe { quads.as_mut_ptr().add(i as usize * STRIDE + OFFSET).cast() }
 }
 
-/// Checks that quad `OFFSET` exists of every record in `index`; returns the indices.
+/// Checks that every record in `index` has quad `OFFSET`; returns the indices.
 #[inline(always)]
 fn checked<'a, I: Pod, const STRIDE: usize, const OFFSET: usize>(
     quads: &[Quad],
@@ -52,8 +52,8 @@ fn checked<'a, I: Pod, const STRIDE: usize, const OFFSET: usize>(
     index.array()
 }
 
-/// Prefetches the cache lines of `values[range]`; past the end, nothing. A hint: it
-/// changes no value, and on targets without such an instruction it does nothing.
+/// Prefetches the cache lines of `values[range]`. Does nothing if the range exceeds `values`, or if the
+/// target has no such instruction. A hint that changes no value.
 #[inline(always)]
 pub fn prefetch<T>(values: &[T], range: std::ops::Range<usize>) {
     #[cfg(target_arch = "x86_64")]
@@ -122,7 +122,7 @@ pub fn scatter_halves_1<const S: usize, const O: usize, const P: usize>(
     unsafe { store_halves::<S, O, P>(quads, i, v) }
 }
 
-/// `v[..2]` to the second half of quad `O` of record `i`, `v[2..]` to that of quad `P`.
+/// Writes `v[..2]` to the second half of quad `O` of record `i`, and `v[2..]` to that of quad `P`.
 ///
 /// # Safety
 /// `i * S + max(O, P) < quads.len()`.
@@ -189,7 +189,7 @@ pub use halves::{gather_8, scatter_8, scatter_halves_8};
 #[cfg(not(all(target_arch = "x86_64", target_feature = "avx512f")))]
 pub use halves::{gather_16, scatter_16, scatter_halves_16};
 
-/// The module of one register width. `$lanes` 128-bit lanes a register.
+/// The module of one register width, with `$lanes` 128-bit lanes per register.
 #[cfg(all(target_arch = "x86_64", target_feature = "avx"))]
 macro_rules! registers {
     ($module:ident, $register:ident, $float:ident, $class:ident, $lanes:literal, $unpacklo:ident, $unpackhi:ident,
@@ -219,7 +219,7 @@ macro_rules! registers {
             /// Quads of records `k`, `4 + k`, …, one per 128-bit lane.
             ///
             /// # Safety
-            /// Quad `O` exists of every record in `index`.
+            /// Every record in `index` has quad `O`.
             #[inline(always)]
             unsafe fn load<const S: usize, const O: usize>(
                 quads: &[Quad],
@@ -303,8 +303,8 @@ macro_rules! registers {
                 }
             }
 
-            /// Keeps a transposed register whole: without it the optimizer splits the
-            /// transpose into 128-bit shuffles, one set per extracted lane.
+            /// Keeps a transposed register whole. Otherwise the optimizer splits the transpose into 128-bit
+            /// shuffles, one set per extracted lane.
             #[inline(always)]
             fn barrier(mut v: $register) -> $register {
                 // SAFETY: an empty instruction that claims to read and write one register.
@@ -371,7 +371,7 @@ registers!(
     ]
 );
 
-/// Widths without instructions of their own: two of half the width, joined.
+/// Widths without native instructions: two vectors of half the width, joined.
 #[allow(dead_code)]
 mod halves {
     use super::*;

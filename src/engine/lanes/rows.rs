@@ -1,7 +1,7 @@
-//! Rows of bodies: what sweeps gather and scatter.
+//! Rows of bodies, which sweeps gather and scatter.
 //!
-//! A row is two quads, and [`super::quads`] moves it by halves. Sixteen bodies are gathered by whole
-//! rows instead, which takes half the loads. Single columns are moved to compare with rows.
+//! A row is two quads, and [`super::quads`] moves it by halves. Sixteen bodies are gathered by whole rows
+//! instead, which takes half the loads. Gathers and scatters of single columns exist for comparison.
 
 #![allow(
     unsafe_code,
@@ -11,7 +11,7 @@
 use super::index::{LaneIndex, assert_fits};
 use bytemuck::{Pod, Zeroable};
 
-/// A body as sweeps read and write it: its velocity, and its displacement since the start of the step.
+/// A body in sweeps: its velocity and its displacement since the start of the step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub struct BodyRow {
@@ -45,7 +45,7 @@ pub use self::{load_each as load_at_16, store_each as store_at_16};
 #[cfg(all(target_arch = "x86_64", target_feature = "avx512f"))]
 pub use avx512::{gather_16, load_at_16, store_at_16};
 
-/// Without instructions for 16 lanes, by halves of rows.
+/// By half rows, if there are no instructions for 16 lanes.
 #[cfg(not(all(target_arch = "x86_64", target_feature = "avx512f")))]
 #[inline(always)]
 pub fn gather_16(rows: &[BodyRow], index: LaneIndex<[u32; 16]>) -> [wide::f32x16; 8] {
@@ -58,7 +58,7 @@ pub fn gather_16(rows: &[BodyRow], index: LaneIndex<[u32; 16]>) -> [wide::f32x16
 #[cfg(all(target_arch = "x86_64", target_feature = "avx"))]
 pub use avx::gather_8;
 
-/// Without instructions for 8 lanes, by halves of rows.
+/// By half rows, if there are no instructions for 8 lanes.
 #[cfg(not(all(target_arch = "x86_64", target_feature = "avx")))]
 #[inline(always)]
 pub fn gather_8(rows: &[BodyRow], index: LaneIndex<[u32; 8]>) -> [wide::f32x8; 8] {
@@ -74,7 +74,8 @@ mod avx {
     use std::arch::x86_64::*;
     use wide::f32x8;
 
-    /// By whole rows: 8 loads and 24 shuffles. By half rows it is 16 loads, 8 of them with an insert, and 16 shuffles.
+    /// By whole rows: 8 loads and 24 shuffles. By half rows it would be 16 loads, 8 of them with an insert,
+    /// and 16 shuffles.
     #[inline(always)]
     pub fn gather_8(rows: &[BodyRow], index: LaneIndex<[u32; 8]>) -> [f32x8; 8] {
         assert_fits(index.bound(), rows.len(), 1);
@@ -122,23 +123,23 @@ mod avx512 {
         }
     }
 
-    /// By whole rows: 16 loads, 8 of them with an insert, and 24 shuffles. By half rows, 32 loads,
-    /// 24 of them with an insert, and 16 shuffles, sweeps are 6 % slower. Masked broadcasts in
-    /// place of the inserts changed nothing.
+    /// By whole rows: 16 loads, 8 of them with an insert, and 24 shuffles. By half rows (32 loads, 24 of them
+    /// with an insert, and 16 shuffles) sweeps are 6 % slower. Masked broadcasts instead of the inserts made
+    /// no difference.
     #[inline(always)]
     pub fn gather_16(rows: &[BodyRow], index: LaneIndex<[u32; 16]>) -> [f32x16; 8] {
         assert_fits(index.bound(), rows.len(), 1);
         let index = index.array();
         // SAFETY: every entry is below the bound.
         unsafe {
-            // In 128-bit lanes: velocities of bodies 0..4, deltas of the same, then of 4..8.
+            // 128-bit lanes: velocities of bodies 0..4, their deltas, then the same of bodies 4..8.
             let p = transpose([
                 load(rows, index, 0),
                 load(rows, index, 1),
                 load(rows, index, 2),
                 load(rows, index, 3),
             ]);
-            // The same of bodies 8..16.
+            // The same for bodies 8..16.
             let q = transpose([
                 load(rows, index, 8),
                 load(rows, index, 9),
@@ -151,7 +152,7 @@ mod avx512 {
         }
     }
 
-    /// The instructions take indices as signed: no list of values that are read so is as long as 2³¹.
+    /// The instructions treat indices as signed, so only the first 2³¹ values can be accessed.
     const SIGNED: usize = 1 << 31;
 
     #[inline(always)]

@@ -1,4 +1,4 @@
-//! Where sweeps keep the rows of bodies: packed, as solvers do, or in columns, to compare.
+//! Storage of body rows for sweeps: packed, as solvers use it, or in columns, for comparison.
 
 use super::aligned::LaneVec;
 use super::index::{IndexList, LaneIndex, assert_fits};
@@ -7,21 +7,21 @@ use super::vector::Lanes;
 
 /// Rows of bodies that a sweep gathers from and scatters to.
 pub trait RowStore {
-    /// Checks before a loop over batches what gathers and scatters in it would check in every batch:
-    /// that no row of `index` is missing. The checks in the loop are then gone from what is compiled. With
-    /// them alone a sweep of 16 lanes takes 3 % longer.
+    /// Checks once, before a loop over batches, that no row of `index` is missing. The compiler can then
+    /// remove the checks of gathers and scatters inside the loop. With the checks inside the loop alone, a
+    /// sweep of 16 lanes takes 3 % longer.
     ///
     /// # Panics
-    /// If one is.
+    /// If a row is missing.
     fn assert_rows(&self, index: IndexList);
 
-    /// `[vx, vy, ω, m⁻¹, Δx, Δy, Δθ, I⁻¹]` of the rows that `index` names.
+    /// `[vx, vy, ω, m⁻¹, Δx, Δy, Δθ, I⁻¹]` of the rows in `index`.
     ///
     /// # Panics
     /// If the store has fewer rows than the bound of `index`.
     fn gather<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8];
 
-    /// As [`Self::gather`], for rows that have not just been written; see [`Lanes::gather_whole`].
+    /// As [`Self::gather`], for rows that were not written just before; see [`Lanes::gather_whole`].
     #[inline(always)]
     fn gather_whole<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
         self.gather::<L>(index)
@@ -56,12 +56,11 @@ impl RowStore for [BodyRow] {
     }
 }
 
-/// A column per quantity of a row: the pure structure of arrays.
+/// One column per quantity of a row: a pure structure of arrays.
 ///
-/// Solvers do not use it: a body is then eight cache lines instead of one, and eight gathers of
-/// one float a lane instead of one aligned load a body; a sweep of 16 lanes takes 2.8 times as
-/// long. It is here so that `benches/kernel.rs`
-/// can say what that costs.
+/// Solvers do not use it. A body then takes eight cache lines instead of one, and eight gathers of one float
+/// per lane instead of one aligned load per body; a sweep of 16 lanes takes 2.8 times as long. It exists so
+/// that `benches/kernel.rs` can measure this cost.
 #[derive(Clone, Debug, Default)]
 pub struct RowColumns {
     columns: [LaneVec; 8],
@@ -99,7 +98,7 @@ impl RowStore for RowColumns {
 
     #[inline(always)]
     fn scatter_velocity<L: Lanes>(&mut self, index: LaneIndex<L::Index>, velocity: [L; 4]) {
-        // The inverse mass does not change, and a column can be left alone where half a row cannot.
+        // The inverse mass does not change. With columns it need not be written, unlike with half rows.
         for (column, v) in self.columns.iter_mut().zip(velocity).take(3) {
             L::store_at(column, index, v);
         }

@@ -2,11 +2,11 @@
 
 use super::{native_width, target_features};
 
-/// One line that names the vector instructions that this CPU has and this build does not use, and the line to add;
-/// none if the build uses all of them.
+/// A one-line message naming the vector instructions that this CPU has and this build does not use, with the
+/// configuration line to add. `None` if the build uses all of them.
 ///
-/// Cargo does not pass the build flags of a library on to its users, and a plain build for x86-64 uses SSE2 only: 4
-/// lanes where a recent CPU has 16. Looks at the CPU once, in nanoseconds.
+/// Cargo does not pass the build flags of a library on to its users, and a plain build for x86-64 uses only
+/// SSE2: 4 lanes, where a recent CPU has 16. Checks the CPU once, in nanoseconds.
 ///
 /// ```
 /// # use simpulse_engine as simpulse;
@@ -26,7 +26,7 @@ pub fn unused_cpu_features() -> Option<String> {
     })
 }
 
-/// The widest instructions that the CPU has, named as in [`target_features`], and their lanes.
+/// The widest vector instructions of the CPU, named as in [`target_features`], and their lanes.
 #[cfg(target_arch = "x86_64")]
 fn widest() -> Option<(&'static str, usize)> {
     if is_x86_feature_detected!("avx512f") {
@@ -40,7 +40,7 @@ fn widest() -> Option<(&'static str, usize)> {
     }
 }
 
-/// Elsewhere a plain build uses what every CPU has.
+/// On other architectures a plain build uses the vector instructions that every CPU has.
 #[cfg(not(target_arch = "x86_64"))]
 fn widest() -> Option<(&'static str, usize)> {
     None
@@ -51,7 +51,8 @@ mod tests {
     use super::*;
     use crate::engine::lanes::LaneWidth;
 
-    /// A build for this CPU has nothing to say, and one for fewer lanes names both and the line to add.
+    /// `None` in a build for this CPU. In a build with fewer lanes, the message names both widths and the
+    /// line to add.
     #[test]
     fn says_what_a_build_leaves_unused() {
         let Some((name, lanes)) = widest() else { return };

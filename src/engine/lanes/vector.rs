@@ -1,11 +1,11 @@
-//! The one trait that kernels are written in, and what it promises.
+//! The [`Lanes`] trait that kernels use, and its guarantees.
 //!
 //! Every operation gives, lane by lane, the same bits at every width:
 //!
-//! * `+ − × ÷` are IEEE operations and agree by themselves.
+//! * `+ − × ÷` are IEEE operations and agree anyway.
 //! * [`Lanes::mul_add`] is fused at every width or at none ([`FUSED`]).
-//! * [`Lanes::max`] and [`Lanes::min`] return the *second* operand when the two
-//!   compare equal (so for ±0) or are unordered: the rule of the x86 instructions.
+//! * [`Lanes::max`] and [`Lanes::min`] return the *second* operand if the two compare equal (so for ±0) or
+//!   are unordered, as the x86 instructions do.
 //! * No reciprocal estimates.
 
 use super::index::LaneIndex;
@@ -19,7 +19,7 @@ pub const FUSED: bool = cfg!(any(
     all(target_arch = "x86_64", target_feature = "fma"),
     all(target_arch = "aarch64", target_feature = "neon")
 ));
-/// `WIDTH` floats that are worked on together.
+/// `WIDTH` floats that are processed together.
 pub trait Lanes:
     Pod + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
@@ -56,8 +56,8 @@ pub trait Lanes:
     /// Whether any lane is above 0.
     fn any_positive(self) -> bool;
 
-    /// The rows of `WIDTH` bodies, transposed, by their halves where a width has no other way:
-    /// `[vx, vy, ω, m⁻¹, Δx, Δy, Δθ, I⁻¹]`.
+    /// The rows of `WIDTH` bodies, transposed: `[vx, vy, ω, m⁻¹, Δx, Δy, Δθ, I⁻¹]`. Loaded by half rows by
+    /// default.
     ///
     /// # Panics
     /// If there are fewer rows than the bound of `index`.
@@ -68,9 +68,9 @@ pub trait Lanes:
         [v[0], v[1], v[2], v[3], d[0], d[1], d[2], d[3]]
     }
 
-    /// As [`Self::gather`], by whole rows where that is fewer loads, as at eight lanes. A row of which a half has
-    /// just been written cannot be loaded whole before that half is in the cache: sweeps of a stack of 20 take 5 to 10 % longer,
-    /// those of a pyramid of 5050 boxes 2 to 4 % less.
+    /// As [`Self::gather`], but loads whole rows at widths where this takes fewer loads, such as eight lanes.
+    /// A row with a half that was just written cannot be loaded whole before that half is in the cache:
+    /// sweeps of a stack of 20 take 5 to 10 % longer, those of a pyramid of 5050 boxes 2 to 4 % less.
     ///
     /// # Panics
     /// As [`Self::gather`].
@@ -130,7 +130,7 @@ pub trait Lanes:
     /// `self == other ? yes : no`, as floats: −0 equals 0.
     fn select_equal(self, other: Self, yes: Self, no: Self) -> Self;
 
-    /// The whole number n in [0, 2²³) that `self` holds, as the bits of the integer n.
+    /// `self`, an integer n in [0, 2²³), converted to the bits of the integer n.
     fn integer_bits(self) -> Self;
 
     /// `values[index[lane]]` in every lane.
@@ -152,6 +152,6 @@ pub trait Lanes:
     }
 }
 
-/// Floats from 2²³ on are the integers, and their last 23 bits count from there.
+/// Floats from 2²³ to 2²⁴ are the integers, and their last 23 bits count from 2²³.
 pub(super) const INTEGERS: f32 = 8_388_608.0;
 pub(super) const MANTISSA: u32 = 0x007F_FFFF;

@@ -1,4 +1,4 @@
-//! Four, eight and sixteen lanes: the vectors of `wide`.
+//! Four, eight and sixteen lanes: the vector types of `wide`.
 
 use super::index::LaneIndex;
 use super::quads::{self, Quad};
@@ -130,7 +130,7 @@ mod tests {
     use crate::engine::lanes::{IndexList, MOST_LANES, RowColumns, RowStore};
     use proptest::prelude::*;
 
-    /// Awkward values are drawn as often as ordinary ones.
+    /// Awkward values, as often as ordinary ones.
     fn awkward() -> impl Strategy<Value = f32> {
         prop_oneof![
             prop::sample::select(vec![0.0, -0.0, 1.0, -1.0, f32::MIN_POSITIVE, 1e-40, 3e38, -3e38, 1e-7]),
@@ -153,7 +153,7 @@ mod tests {
         a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
     }
 
-    /// Every operation of one width against the same operation on scalars.
+    /// Compares every operation of one width with the same operation on scalars.
     fn agrees_with_scalar<L: Lanes>(x: &[f32], y: &[f32], z: &[f32]) -> Result<(), TestCaseError> {
         let (a, b, c) = (load::<L>(x), load::<L>(y), load::<L>(z));
         type Scalar = fn(f32, f32, f32) -> f32;
@@ -185,7 +185,7 @@ mod tests {
         Ok(())
     }
 
-    /// Gather, then scatter changed halves, against plain indexing.
+    /// Compares a gather and a scatter of changed halves with plain indexing.
     fn moves_rows<L: Lanes>(index: &[u32]) -> Result<(), TestCaseError> {
         let row = |i: usize| BodyRow {
             velocity: std::array::from_fn(|k| (10 * i + k) as f32),

@@ -1,4 +1,4 @@
-//! Lane widths, and the native one of the build.
+//! Lane widths, and the native width of the build.
 
 /// Number of contacts that one instruction processes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -28,13 +28,13 @@ impl LaneWidth {
         }
     }
 
-    /// The width with that many lanes, if there is one.
+    /// The width with this many lanes, if any.
     pub fn from_lanes(lanes: usize) -> Option<Self> {
         Self::ALL.into_iter().find(|w| w.lanes() == lanes)
     }
 }
 
-/// The widest lanes that this build has instructions for; wider ones are emulated.
+/// The widest lanes with native instructions in this build; wider ones are emulated.
 pub const fn native_width() -> LaneWidth {
     if cfg!(target_feature = "avx512f") {
         LaneWidth::W16
@@ -47,7 +47,7 @@ pub const fn native_width() -> LaneWidth {
     }
 }
 
-/// The vector extensions that this build uses, for records.
+/// Name of the vector extensions that this build uses, for records.
 pub fn target_features() -> &'static str {
     if cfg!(target_feature = "avx512f") {
         "avx512f+fma"

@@ -1,4 +1,4 @@
-//! The narrow phase of many pairs of one kind: manifolds updated where they lie, in lanes.
+//! The narrow phase of many pairs of one kind: updates manifolds in place, in lanes.
 
 use super::Margins;
 use super::circles::{self, Rolling};
@@ -15,7 +15,7 @@ use crate::engine::shapes::Shape;
 use bytemuck::bytes_of;
 use wide::{f32x4, f32x8, f32x16};
 
-/// Which kernel a pair of shapes has.
+/// The kernel of a pair of shapes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PairKind {
     /// [`rectangles`]
@@ -26,7 +26,7 @@ pub enum PairKind {
     Hulls,
     /// [`super::hull_circle`]
     HullCircle,
-    /// The same with a and b exchanged.
+    /// [`super::hull_circle`] with a and b exchanged.
     CircleHull,
 }
 
@@ -40,7 +40,7 @@ impl PairKind {
         PairKind::CircleHull,
     ];
 
-    /// The kernel of such a pair. Two segments have none, because they never touch.
+    /// The kernel of such a pair; `None` for two segments, which never touch.
     pub fn of(a: Class, b: Class) -> Option<Self> {
         match (a, b) {
             (Class::Rectangle, Class::Rectangle) => Some(PairKind::Rectangles),
@@ -53,20 +53,20 @@ impl PairKind {
     }
 }
 
-/// Shapes as the kernels read them, by number.
+/// Shapes in kernel form, by number.
 #[derive(Clone, Debug, Default)]
 pub struct Shapes {
     rows: Vec<ShapeRow>,
     hulls: Vec<HullRow>,
 }
 
-/// A shape's row is looked for among so many of the last ones.
+/// Number of recent rows among which an equal one is searched.
 const RECENT: usize = 64;
 
 impl Shapes {
-    /// Adds a shape; returns its class and its number. Shapes that are alike to the bit share one, as
-    /// far as they come one soon after the other: most scenes then have few rows, which stay in the
-    /// cache, and many batches of a single one.
+    /// Adds a shape; returns its class and its number. Shapes with equal bits share a number if they are
+    /// added soon after each other. Most scenes then have few rows, which stay in the cache, and many batches
+    /// of a single one.
     pub fn push(&mut self, shape: &Shape) -> (Class, u32) {
         let (class, row) = ShapeRow::new(shape);
         let hull = HullRow::new(shape);
@@ -92,24 +92,24 @@ pub struct Jobs {
     pub bodies: [Vec<u32>; 2],
     /// Numbers of shapes a and b ([`Shapes::push`]).
     pub shapes: [Vec<u32>; 2],
-    /// The contact that holds the manifold, or [`NO_CONTACT`].
+    /// The contact that stores the manifold, or [`NO_CONTACT`].
     pub contact: Vec<u32>,
 }
 
-/// A pair that has not touched so far.
+/// Index of a pair without a contact.
 pub const NO_CONTACT: u32 = u32::MAX;
 
 impl Jobs {
-    /// Bytes held.
+    /// Allocated bytes.
     pub fn held_bytes(&self) -> usize {
         let Jobs { name, bodies: [a, b], shapes: [c, d], contact } = self;
         [name, a, b, c, d, contact].map(held).iter().sum()
     }
 
-    /// Lists those of `pairs` that `job` keeps, instead of what was listed. `job` returns whether it
-    /// does, and the pair's bodies, shapes and contact.
+    /// Replaces the jobs by those of `pairs` that `job` keeps. `job` returns whether to keep a pair, and its
+    /// bodies, shapes and contact.
     ///
-    /// Every pair is written, behind those kept before it: no branch waits for the decision.
+    /// Every pair is written after the last kept one, whether kept or not, which avoids a branch.
     #[inline(always)]
     pub fn list(&mut self, pairs: &[u32], mut job: impl FnMut(u32) -> (bool, [u32; 2], [u32; 2], u32)) {
         let Jobs { name, bodies: [a, b], shapes: [c, d], contact } = self;
@@ -140,25 +140,26 @@ impl Jobs {
 pub struct Input<'a> {
     /// Poses by body.
     pub poses: &'a [PoseRow],
-    /// Motion of bodies in the coming step, and slightly longer, without contacts: `[x, y, θ, 0]` (m, rad), by body.
+    /// Motion of bodies without contacts over slightly more than the coming step: `[x, y, θ, 0]` (m, rad), by
+    /// body.
     pub ways: &'a [Quad],
-    /// Whether radii of curvature are found, and what rolls.
+    /// If set, radii of curvature are computed, and contacts may roll.
     pub rolling: Option<Rolling>,
     /// Shapes by number.
     pub shapes: &'a Shapes,
-    /// Which points are left out, and what is small.
+    /// Distance thresholds.
     pub margins: Margins,
 }
 
-/// Collides every job and updates its contact: geometry recomputed, impulses kept where the feature
-/// stays the same. Returns the number of points.
+/// Collides every job and updates its contact: geometry is recomputed, and impulses are kept for unchanged
+/// features. Returns the number of points.
 ///
-/// A contact that has no point any more gets count 0, and `change(name, contact)` is called for
-/// it; a pair without a contact that touches is reported by the same call. Behind `contacts`
-/// stands room for one more batch, in which such manifolds are made.
+/// A contact without points gets count 0, and `change(name, contact)` is called for it. The same call reports
+/// a touching pair that has no contact yet. The manifolds of such pairs are built in room for one more batch
+/// after the end of `contacts`.
 ///
 /// # Panics
-/// If a job names a body, shape or contact that does not exist, or lists are not equally long.
+/// If a job refers to a body, shape or contact that does not exist, or the lists differ in length.
 pub fn update(
     kind: PairKind,
     width: LaneWidth,
@@ -180,7 +181,7 @@ pub fn update(
         bodies: jobs.bodies.each_ref().map(|list| below(list, input.poses.len(), "bodies")),
         shapes: jobs.shapes.each_ref().map(|list| below(list, input.shapes.rows.len(), "shapes")),
     };
-    // No contact is the largest number, and with one more the smallest.
+    // [`NO_CONTACT`] is the largest number, so adding one makes it the smallest.
     let beyond = jobs.contact.iter().fold(0, |most, &i| i.wrapping_add(1).max(most));
     assert!(jobs.contact.len() == count, "{count} pairs, and contacts for {}", jobs.contact.len());
     assert!(beyond as usize <= made, "a pair of contact {} of {made}", beyond.wrapping_sub(1));
@@ -196,18 +197,18 @@ pub fn update(
     points
 }
 
-/// The lists that kernels gather by.
+/// Index lists used by kernels for gathers.
 #[derive(Clone, Copy)]
 struct JobIndices<'a> {
     bodies: [IndexList<'a>; 2],
     shapes: [IndexList<'a>; 2],
 }
 
-/// Collides the pairs of one kind; as [`update`], with room for a batch of new manifolds from a place on.
+/// Collides the pairs of one kind, as [`update`]. New manifolds are built from the given index on.
 type CollideFn = fn(&Jobs, JobIndices, Input, &mut [Contact], usize, &mut dyn FnMut(u32, &Contact)) -> usize;
 
-/// A function for each kind: in one for all, what one kernel needs of the stack makes others spill, and frames of circles
-/// that turn made rectangles 18 % slower.
+/// A separate function per kind. In one function for all, the stack use of one kernel made others spill, and
+/// the frames of turning circles made rectangles 18 % slower.
 fn run_of<L: Lanes>(kind: PairKind) -> CollideFn {
     match kind {
         PairKind::Rectangles => run::<L, { PairKind::Rectangles as usize }>,
@@ -218,7 +219,7 @@ fn run_of<L: Lanes>(kind: PairKind) -> CollideFn {
     }
 }
 
-/// `KIND`: the place of the kind in [`PairKind::ALL`].
+/// `KIND` is the index of the kind in [`PairKind::ALL`].
 #[inline(never)]
 fn run<L: Lanes, const KIND: usize>(
     jobs: &Jobs,
@@ -228,7 +229,7 @@ fn run<L: Lanes, const KIND: usize>(
     made: usize,
     change: &mut dyn FnMut(u32, &Contact),
 ) -> usize {
-    // Vectors that spill do so within cache lines; see `align_frame`.
+    // Spilled vectors then do not cross cache lines; see `align_frame`.
     align_frame();
     let Input { poses, ways, rolling, shapes: Shapes { rows, hulls }, margins } = input;
     match const { PairKind::ALL[KIND] } {
@@ -276,8 +277,9 @@ fn run<L: Lanes, const KIND: usize>(
     }
 }
 
-/// `contacts[made..]` is the room for a batch of new manifolds. `kernel` reads and collides pairs,
-/// given their bodies and shapes, and returns their radii of curvature, which are written if `has_radii`.
+/// Runs a kernel over all jobs. `contacts[made..]` is the room for a batch of new manifolds. `kernel`
+/// collides the pairs of the given bodies and shapes, and returns their contacts and radii of curvature.
+/// Radii are written if `has_radii`.
 #[inline(always)]
 fn run_kernel<L: Lanes>(
     jobs: &Jobs,
@@ -291,15 +293,15 @@ fn run_kernel<L: Lanes>(
     let mut points = 0_u32;
     let count = jobs.name.len();
     for first in (0..count).step_by(L::WIDTH) {
-        // The last batch is filled up with its first pair, whose result goes to the spare room, as
-        // do those of pairs without a contact. No impulse is ever left there.
+        // The last batch is padded with its first pair, whose result goes to the spare room, as do the
+        // results of pairs without a contact. Impulses in the spare room are always zero.
         let [a, b, c, d] = &mut [[0; MOST_LANES]; 4];
         let bodies = [indices.bodies[0].batch_at(first, a), indices.bodies[1].batch_at(first, b)];
         let shapes = [indices.shapes[0].batch_at(first, c), indices.shapes[1].batch_at(first, d)];
         let filled = (count - first).min(L::WIDTH);
         let mut known = [NO_CONTACT; MOST_LANES];
         match jobs.contact.get(first..first + L::WIDTH) {
-            // Of constant length: no call.
+            // A constant length avoids a function call.
             Some(whole) => known[..L::WIDTH].copy_from_slice(whole),
             None => known[..filled].copy_from_slice(&jobs.contact[first..]),
         }
@@ -307,7 +309,7 @@ fn run_kernel<L: Lanes>(
         for (lane, (target, &known)) in target.iter_mut().zip(&known).enumerate() {
             *target = if known == NO_CONTACT { (made + lane) as u32 } else { known };
         }
-        // Contacts lie farther away than poses and shapes: those of the next batch are prefetched.
+        // Contacts are less often cached than poses and shapes, so those of the next batch are prefetched.
         let next = (first + L::WIDTH).min(count)..(first + 2 * L::WIDTH).min(count);
         let coming = jobs.contact[next].iter().map(|&i| if i == NO_CONTACT { made as u32 } else { i });
         prefetch_records::<{ quad::STRIDE }>(bytemuck::cast_slice(contacts), coming);
@@ -320,7 +322,7 @@ fn run_kernel<L: Lanes>(
             let last = [sum, radii[0], radii[1], rest];
             L::scatter_quads::<{ quad::STRIDE }, { quad::RADII }>(quads, target_lanes, last);
         }
-        // Counts in memory once more, so that a batch without changes is one comparison.
+        // Counts are copied to memory, so that a batch without changes needs only one comparison.
         let mut count = [0.0_f32; MOST_LANES];
         count[..L::WIDTH].copy_from_slice(bytemuck::cast_slice(&[touch.count]));
         if filled < L::WIDTH {
@@ -328,7 +330,7 @@ fn run_kernel<L: Lanes>(
         }
         let mut is_changed = false;
         for (&count, &known) in count[..L::WIDTH].iter().zip(&known) {
-            // Compared, not converted: before AVX-512 there are no lanes that become unsigned integers.
+            // Compared instead of converted: before AVX-512 there is no conversion to unsigned integers.
             points += u32::from(count > 0.0) + u32::from(count > 1.0);
             is_changed |= (count > 0.0) != (known != NO_CONTACT);
         }
@@ -344,12 +346,12 @@ fn run_kernel<L: Lanes>(
     points as usize
 }
 
-/// Writes manifolds into contacts; a point keeps the impulses of the old one of its name.
+/// Writes manifolds into contacts. A point keeps the impulses of the old point with the same feature id.
 ///
-/// Integers are moved and compared as the bits of floats: equal bits of numbers below 2²³ are
-/// equal (tiny) floats. The name of an old point that is not in use is NaN, which equals nothing.
+/// Integers are moved and compared as the bits of floats: numbers below 2²³ with equal bits are equal (tiny)
+/// floats. The id of an unused old point is NaN, which equals nothing.
 ///
-/// No two lanes have the same target.
+/// No two lanes may have the same target.
 #[inline(always)]
 fn merge<L: Lanes>(touch: &Touch<L>, contacts: &mut [Quad], target: LaneIndex<L::Index>) {
     use quad::*;

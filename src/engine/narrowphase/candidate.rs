@@ -11,15 +11,15 @@ pub struct Candidate {
     pub shapes: [u32; 2],
     /// Their bodies.
     pub bodies: [u32; 2],
-    /// The narrow phase's indices of the shapes.
+    /// Numbers of the shapes in the narrow phase.
     pub numbers: [u32; 2],
-    /// Centers of mass farther apart than the root of this cannot be in touch (m²).
+    /// Square of the distance of the centers of mass beyond which the shapes cannot touch (m²).
     pub reach_squared: f32,
     /// Mixed Coulomb coefficient.
     pub friction: f32,
     /// Mixed restitution.
     pub restitution: f32,
-    /// Its contact, or [`super::batch::NO_CONTACT`].
+    /// Index of its contact, or [`super::batch::NO_CONTACT`].
     pub contact: u32,
 }
 
@@ -48,14 +48,14 @@ impl Candidate {
 pub struct Candidates<'a> {
     /// Sorted by shape pair.
     pub all: &'a [Candidate],
-    /// Places in `all` by [`PairKind`], sorted by pair.
+    /// Indices into `all` by [`PairKind`], sorted by pair.
     pub of_kind: &'a [Vec<u32>; PairKind::ALL.len()],
     /// Poses by body.
     pub poses: &'a [PoseRow],
 }
 
 impl<'a> Candidates<'a> {
-    /// Place, candidate and poses of all of a kind, sorted by pair.
+    /// Index, candidate and poses of all candidates of a kind, sorted by pair.
     pub fn of(self, kind: PairKind) -> impl Iterator<Item = (u32, &'a Candidate, [&'a PoseRow; 2])> {
         self.of_kind[kind as usize].iter().map(move |&place| {
             let candidate = &self.all[place as usize];

@@ -2,26 +2,29 @@
 //!
 //! # Circles that pass
 //!
-//! A step sees a gap along the normal n of its beginning. Two circles that pass each other on the way Δ of one step, and
-//! of the substep that a sweep at its end looks ahead, are farther apart than that says: with the distance ℓ of their centers and Δ = (Δ_n, Δ_t), at the end
+//! A step uses the gap along the normal n at its start. Let Δ be the relative motion over one step plus the
+//! substep that a sweep at its end looks ahead. Two circles that pass each other on the way Δ end up farther
+//! apart than along n. With the distance ℓ of their centers and Δ = (Δ_n, Δ_t), the distance at the end is
 //!
 //! ```text
 //! ℓ' = √((ℓ + Δ_n)² + Δ_t²) = ℓ + Δ_n + Δ_t²/(ℓ' + ℓ + Δ_n)
 //! ```
 //!
-//! The reported gap is larger by the last term if the circles come no closer than the slop on their way. Then it is
-//! right at the end of the step, and circles that do not touch are left alone. Circles that graze each other less
-//! deeply, and have passed by the end of the step, may do so until the next step finds them.
+//! The reported gap is increased by the last term if the circles come no closer on their way than an overlap
+//! of one slop. It is then correct at the end of the step, and circles that do not touch are not pushed
+//! apart. Circles that overlap by less than the slop, and have passed each other by the end of the step, are
+//! left alone until the next step detects them.
 
 use super::Margins;
 use super::lanes::{Poses, ShapePair, Touch, abs, dot, rotate};
 use crate::engine::lanes::Lanes;
 
-/// Shares of the slop: from which term on circles pass, and what gap they then have at the end (1).
+/// As fractions of the slop (1): smallest last term for which circles count as having passed, and smallest
+/// gap that they then have at the end of the step.
 pub(super) const PASSING: [f32; 2] = [0.2, 1e-3];
 
-/// The gap (m) of two circles whose centers are `distance` apart (m) and that move by `way` against each other in the
-/// coming step (m); see the [module](self).
+/// The gap (m) of two circles with centers `distance` apart (m) and a relative motion of `way` in the coming
+/// step (m); see the [module](self).
 #[inline(always)]
 pub fn passing<L: Lanes>(touch: &Touch<L>, distance: L, way: [L; 2], slop: f32) -> L {
     let (zero, one, slop) = (L::zero(), L::splat(1.0), L::splat(slop));
@@ -34,7 +37,7 @@ pub fn passing<L: Lanes>(touch: &Touch<L>, distance: L, way: [L; 2], slop: f32) 
     let end = length(straight, across);
     let sum = end + straight;
     let bend = sum.select_positive(across * across / sum.select_positive(sum, one), zero);
-    // The part of the way on which they come closest.
+    // Fraction of the way at which they come closest.
     let squared = along.mul_add(along, across * across);
     let part = -(distance * along) / squared.select_positive(squared, one);
     let until = part.max(zero).min(one);
@@ -46,8 +49,9 @@ pub fn passing<L: Lanes>(touch: &Touch<L>, distance: L, way: [L; 2], slop: f32) 
     gap.min(closest + slop).select_positive(raised, gap)
 }
 
-/// When two centers that are `distance` apart (m) are `reach` apart, as a part of their way, and positive if they come so
-/// close: |d + u t| = R. `toward` is the product d·u, `squared` u².
+/// Time, as a fraction of the way, at which two centers that are `distance` apart (m) are `reach` apart:
+/// |d + u t| = R. The second value is positive if they come that close. `toward` is the product d·u,
+/// `squared` is u².
 #[inline(always)]
 pub fn arrival<L: Lanes>(toward: L, squared: L, [distance, reach]: [L; 2]) -> [L; 2] {
     let product = (distance - reach) * (distance + reach);
@@ -57,26 +61,26 @@ pub fn arrival<L: Lanes>(toward: L, squared: L, [distance, reach]: [L; 2]) -> [L
     [product / comes.select_positive(sum, L::splat(1.0)), comes]
 }
 
-/// Request of a solver that turns the frames of round contacts.
+/// Option for solvers that turn the frames of round contacts.
 ///
-/// A contact rolls if its gap changes by less than [`Rolling::limit`] in the coming step. Its gap is that of the step's
-/// beginning, as its normal turns with it; that of another one is [`passing`].
+/// A contact rolls if its gap changes by less than [`Rolling::limit`] in the coming step. A rolling contact
+/// keeps the gap at the start of the step, since its normal turns with it; other contacts use [`passing`].
 #[derive(Clone, Copy, Debug)]
 pub struct Rolling {
-    /// Change of the gap up to which a contact rolls (m).
+    /// Largest change of the gap of a rolling contact (m).
     pub limit: f32,
 }
 
 impl Rolling {
-    /// Positive where a gap that changes by `along` (m) is that of a contact that rolls.
+    /// Positive if a contact whose gap changes by `along` (m) rolls.
     #[inline(always)]
     pub fn rolls<L: Lanes>(self, along: L) -> L {
         L::splat(self.limit) - abs(along)
     }
 }
 
-/// Contacts of the circles of `pair` in the coming step, in which bodies move by `ways` (`[x, y, θ, 0]`, m and rad), and
-/// their radii of curvature, where `rolling` requests them; see [`Rolling`].
+/// Contacts of the circles of `pair` in the coming step, in which bodies move by `ways` (`[x, y, θ, 0]`, m
+/// and rad). Also returns their radii of curvature if `rolling` is given, otherwise zeros; see [`Rolling`].
 #[inline(always)]
 pub fn in_step<L: Lanes>(
     pair: &ShapePair<L>,
@@ -91,18 +95,18 @@ pub fn in_step<L: Lanes>(
     let touch = touch.on_held(held);
     let Some(rolling) = rolling else { return (touch.with_gap(gap), [L::zero(); 2]) };
     let gap = rolling.rolls(dot(touch.normal, way)).select_positive(touch.separation[0], gap);
-    // Centers in one place have no direction to turn.
+    // Coincident centers define no direction to turn.
     let radii = pair.size.map(|size| distance.select_positive(size[2], L::zero()));
     (touch.with_gap(gap), radii)
 }
 
-/// Contacts of the circles of `pair`; those farther apart than `speculative` (m) are left out.
+/// Contacts of the circles of `pair`. Circles farther apart than `speculative` (m) are omitted.
 #[inline(always)]
 pub fn collide<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> Touch<L> {
     with_distance(pair, speculative).0
 }
 
-/// The same, and the distances of the centers (m).
+/// As [`collide`]; also returns the distances of the centers (m).
 #[inline(always)]
 pub fn with_distance<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> (Touch<L>, L) {
     let (zero, one) = (L::zero(), L::splat(1.0));
@@ -129,11 +133,11 @@ pub fn with_distance<L: Lanes>(pair: &ShapePair<L>, speculative: f32) -> (Touch<
 }
 
 impl<L: Lanes> Touch<L> {
-    /// The same contact with its point between the surfaces of circles of radius `size` about these centers (m, from
-    /// the centers of mass).
+    /// The same contact with its anchors set. The centers of the circles are given relative to the centers of
+    /// mass (m); `size` are the radii (m).
     ///
-    /// From each center by its own radius: for circles centered on their bodies both anchors are multiples of the normal,
-    /// and friction is all that turns them.
+    /// Each anchor is computed from its own center and radius: for circles centered on their bodies both
+    /// anchors are then multiples of the normal, and only friction can turn them.
     #[inline(always)]
     fn with_anchors(self, center_a: [L; 2], center_b: [L; 2], size: [L; 2]) -> Self {
         let [r_a, r_b] = size.map(|size| L::splat(0.5).mul_add(self.separation[0], size));

@@ -1,19 +1,19 @@
-//! A reference face and an incident face, in lanes: the points of their contact.
+//! Contact points of a reference face and an incident face, in lanes.
 //!
-//! Coordinates (N, T) are along the outward normal n of the reference face and along t = n⊥, with
-//! their origin near b's center of mass, so that what is small keeps its digits where a is the
-//! large ground. The reference face runs from `low` to `high` along T at height `top`; the incident
-//! face, the one of the other hull most opposed to n, from its left end (large T) to its right one.
+//! Coordinates (N, T) are along the outward normal n of the reference face and along t = n⊥. Their origin is
+//! near b's center of mass, so that small quantities keep their digits when a is the large ground. The
+//! reference face runs from `low` to `high` along T at height `top`. The incident face is the face of the
+//! other hull most opposed to n; it runs from its left end (large T) to its right one.
 //!
-//! *Clipped.* The incident face, cut to the range of T that the reference face covers. Ends that
-//! are cut take their T from the reference face exactly, not from an interpolation.
+//! *Clipped.* The incident face is cut to the range of T that the reference face covers. Cut ends take their
+//! T exactly from the reference face, not from an interpolation.
 //!
-//! *Past an end.* If the deepest incident end q lies above and beside the reference face, the
-//! nearest point of the reference hull is that end of the face, whatever the other shape is; what
-//! the other shape's nearest point to it is, the caller knows. The normal is along the line between
-//! the two, and there is one point. Where faces are flush, the deepest end is so by rounding only:
-//! there q is the end nearer to the face, and an edge over the face needs no q, so that aligned
-//! boxes keep both points however they jitter. The distance is off by 1 in 10⁴ at most.
+//! *Past an end.* If the deepest incident end q lies above and beside the reference face, the nearest point
+//! of the reference hull is that end of the face, whatever the other shape is. The caller provides the
+//! nearest point of the other shape to it. The normal is along the line between the two, and there is one
+//! point. If faces are flush, rounding alone decides which end is deepest. Then q is the end nearer to the
+//! face, and an edge over the face does not need q, so aligned boxes keep both points when they jitter. The
+//! error of the distance is at most 1 in 10⁴.
 //!
 //! Source: Sutherland, Hodgman 1974 (clipping).
 
@@ -21,52 +21,53 @@ use super::Margins;
 use super::lanes::{Touch, perp};
 use crate::engine::lanes::Lanes;
 
-/// Between flush faces, b's becomes the reference only if it is better
-/// by this share of the slop (1). They tie in exact arithmetic; without a preference their
-/// roles, and with them normal and separations, would follow the rounding.
+/// Between flush faces, b's becomes the reference only if it is better by this fraction of the slop (1).
+/// Flush faces tie in exact arithmetic. Without a preference, rounding would decide their roles, and with
+/// them the normal and the separations.
 pub const REFERENCE_TOLERANCE: f32 = 0.1;
 
-/// Faces are flush if the cosine between their normals is below this (1): 0.01 rad, by
-/// which the preference above then turns the normal at most.
+/// Faces are flush if the cosine between their normals is below this (1). This is 0.01 rad, the most that the
+/// preference above can turn the normal.
 pub const FLUSH: f32 = -0.99995;
 
-/// Vertices closer than this share of the slop (1) do not define a normal: its rounding, about 1e-7 of
-/// the coordinates over this length, would show. Points closer than this are one.
+/// Vertices closer than this fraction of the slop (1) do not define a normal: its rounding error, about 1e-7
+/// of the coordinates divided by this length, would be noticeable. Points closer than this are merged.
 const VERTEX_TOLERANCE: f32 = 0.01;
 
-/// Part of a face (1) that is a graze, if it is less than the slop; see [`Touch::without_grazes`].
+/// Largest overlap of two faces along T that is a graze, as a fraction of the shorter face (1), if this is
+/// below the slop; see [`Touch::without_grazes`].
 const GRAZE: f32 = 0.25;
 
 /// The two faces that bound a contact.
 pub struct Faces<L> {
     /// n, in world axes.
     pub normal: [L; 2],
-    /// From the center of mass of b to where N = T = 0, in world axes (m).
+    /// From the center of mass of b to the point N = T = 0, in world axes (m).
     pub origin: [L; 2],
     /// From the center of mass of a to that of b, in world axes (m).
     pub centers: [L; 2],
-    /// Where positive, the reference face is b's.
+    /// Positive if the reference face is b's.
     pub flip: L,
-    /// Where positive, the shapes are out of reach.
+    /// Positive if the shapes are farther apart than the speculative distance.
     pub beyond: L,
     /// Height of the reference face (m).
     pub top: L,
-    /// Where it begins and ends (m).
+    /// T at its two ends (m).
     pub range: [L; 2],
     /// Ends of the incident face: left and right, each (N, T) (m).
     pub ends: [[L; 2]; 2],
-    /// Part along n of the incident face's normal.
+    /// Component along n of the incident face's normal.
     pub opposed: L,
-    /// Names of the vertices at the ends of `range`, and of those at `ends`.
+    /// Vertex numbers of the ends of `range`, and of those of `ends`.
     pub names: [[L; 2]; 2],
     /// Rounding radii of the reference hull and the incident one (m).
     pub radii: [L; 2],
 }
 
-/// The contact of two faces; points farther apart than `margins.speculative` (m) are left out.
+/// The contact of two faces; points farther apart than `margins.speculative` (m) are omitted.
 ///
-/// `nearest(end, wanted)` is the way from `end` to the nearest point of the incident hull, in
-/// (N, T); only where `wanted` is positive does it matter.
+/// `nearest(end, wanted)` returns the vector from `end` to the nearest point of the incident hull, in (N, T).
+/// Its value is used only if `wanted` is positive.
 #[inline(always)]
 pub fn touch<L: Lanes>(
     faces: &Faces<L>,
@@ -82,7 +83,7 @@ pub fn touch<L: Lanes>(
     let radii = r_radius + i_radius;
     let (height_left, height_right) = (left[0] - top, right[0] - top);
 
-    // The deepest end q, and where that is past an end of the reference face.
+    // The deepest end q, and whether it is past an end of the reference face.
     let parallel = L::splat(FLUSH) - faces.opposed;
     let left_is_past = low - left[1];
     let q_is_left = parallel.select_positive(left_is_past, height_right - height_left);
@@ -90,13 +91,13 @@ pub fn touch<L: Lanes>(
     let q_height = q_is_left.select_positive(height_left, height_right);
     let (past_low, past_high) = (low - q, q - high);
     let outside = past_low.max(past_high);
-    // Flush and within the range: clipped, whatever rounding says of q.
+    // Flush and within the range: clipped, whatever rounding does to q.
     let sticks_out = left_is_past.max(right[1] - high);
     let beside = parallel.select_positive(sticks_out.max(zero), one);
     let apart = q_height.min(outside).min(beside);
 
-    // Clipped. An edge that misses the range leaves its nearer end, and one without extent (the end
-    // of a capsule, the side of a needle) both of its ends.
+    // Clipped. An edge outside the range keeps its nearer end; an edge without extent (the end of a capsule,
+    // the side of a needle) keeps both ends.
     let t_left = left[1].min(high).max(right[1]);
     let t_right = right[1].max(low).min(left[1]);
     let extent = left[1] - right[1];
@@ -104,7 +105,7 @@ pub fn touch<L: Lanes>(
     let slope = (height_right - height_left) / wide.select_positive(extent, one);
     let height_0 = wide.select_positive((left[1] - t_left).mul_add(slope, height_left), height_left);
     let height_1 = wide.select_positive((left[1] - t_right).mul_add(slope, height_left), height_right);
-    // The surfaces along n: incident at −r_i from its core point, reference at −height + r_r from
+    // Surfaces along n: the incident one at −r_i from its core point, the reference one at −height + r_r from
     // it. Midway between them:
     let level = half * (r_radius - i_radius);
     let clipped = |height: L, t: L| [half.mul_add(height, top + level), t];
@@ -117,7 +118,7 @@ pub fn touch<L: Lanes>(
     };
     let (id_0, id_1) = (name(second, left_name), name(first, right_name));
 
-    // Past an end: the incident point nearest to it.
+    // Past an end: the nearest point of the incident hull.
     let end = [top, past_low.select_positive(low, high)];
     let g = nearest(end, apart.min(-faces.beyond));
     let distance = g[0].mul_add(g[0], g[1] * g[1]).sqrt();
@@ -130,15 +131,15 @@ pub fn touch<L: Lanes>(
     let id_past =
         name(past_low.select_positive(first, second), q_is_left.select_positive(left_name, right_name));
 
-    // Flush faces that pass each other by less than a graze.
+    // Flush faces that overlap along T by less than a graze.
     let width = t_left - t_right;
     let graze = L::splat(margins.slop).min(L::splat(GRAZE) * extent.min(high - low));
     let passes = parallel.min(graze - width).min(s_0.min(s_1));
 
-    // Which points there are. A cut that leaves next to nothing leaves the deeper end.
+    // Selection of points. If almost nothing is left of the clipped face, only the deeper end is kept.
     let one_point = same - width;
-    // To keep the far point of a pair whose other point is near was tried: it changes overlaps in
-    // piles by −4 % to +4 % and gives the solver a seventh more points.
+    // Tried: keeping the far point of a pair if its other point is near. This changes overlaps in piles by
+    // −4 % to +4 % and gives the solver a seventh more points.
     let near = |s: L| (s - speculative).select_positive(none, one);
     let keep_0 = one_point.select_positive((s_0 - s_1).select_positive(none, one), one).min(near(s_0));
     let keep_1 = one_point.select_positive((s_0 - s_1).select_positive(one, none), one).min(near(s_1));
@@ -150,7 +151,7 @@ pub fn touch<L: Lanes>(
         [choose(p_past[0], p_0[0]), choose(p_past[1], p_0[1]), choose(s_past, s_0), choose(id_past, id_0)];
     let point_1 = [p_1[0], p_1[1], s_1, id_1];
 
-    // In the order of a's face, and without holes. Seen from b the two come the other way round.
+    // In the order of a's face, and without holes. Relative to b the order is reversed.
     let both = keep_0.min(keep_1);
     let second_first = flip.min(both).max(-keep_0);
     let points = [

@@ -1,14 +1,12 @@
-//! Penetration depth of two convex cores by their support functions alone.
+//! Penetration depth of two convex cores, using only their support functions.
 //!
-//! The depth is the distance of the origin from the border of M = B ⊖ A. Keep a convex
-//! polygon of vertices of M, counter-clockwise; take its edge nearest to the origin (by
-//! signed distance) and ask M for its support along that edge's normal. If M does not
-//! reach past the edge, the edge lies on the border and is the answer; else insert the
-//! support and go on.
+//! The depth is the distance of the origin from the boundary of M = B ⊖ A. Keep a convex polygon of vertices
+//! of M, counter-clockwise. Take its edge nearest to the origin (by signed distance) and compute the support
+//! of M along that edge's normal. If M does not extend past the edge, the edge lies on the boundary and is
+//! the result. Otherwise insert the support and repeat.
 //!
-//! The first polygon is the supports along ±x and ±y. It need not contain the origin,
-//! nor have an area: an edge that sees the origin outside has a negative distance and
-//! is expanded first.
+//! The initial polygon consists of the supports along ±x and ±y. It need not contain the origin or have an
+//! area: an edge with the origin outside has a negative distance and is expanded first.
 //!
 //! Source: van den Bergen, Game Developers Conference 2001.
 
@@ -19,22 +17,22 @@ use glam::DVec2;
 /// Depth of the overlap of two cores (the shapes without their radii).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Penetration {
-    /// Length of the shortest translation that parts the cores (m). Negative if they are
-    /// apart: then its size is the largest separation of any face, at most the distance.
+    /// Length of the shortest translation that separates the cores (m). Negative if they are separate; its
+    /// magnitude is then the largest separation of any face, at most the distance.
     pub depth: f64,
-    /// Unit vector from a to b: moving b along it by `depth` parts the cores.
+    /// Unit vector from a to b: moving b along it by `depth` separates the cores.
     pub normal: DVec2,
-    /// Supports evaluated after the first four.
+    /// Number of supports evaluated after the first four.
     pub iterations: u32,
 }
 
-/// Progress below which an edge lies on the border, relative to the size of M: rounding.
+/// Progress below which an edge counts as on the boundary, relative to the size of M: rounding.
 const TOLERANCE: f64 = 1.0e-14;
 
-/// M has at most 16 vertices, and each iteration but the last finds one.
+/// M has at most 16 vertices, and each iteration except the last finds one.
 const MAX_ITERATIONS: u32 = 64;
 
-/// Penetration of the cores of `a` and `b`. The normal is (0, 1) where both are the same point.
+/// Penetration of the cores of `a` and `b`. The normal is (0, 1) if both are the same point.
 pub fn penetration(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> Penetration {
     let cores = Cores::new(a, pose_a, b, pose_b);
     let mut border: Vec<DVec2> = Vec::with_capacity(16);
@@ -56,7 +54,7 @@ pub fn penetration(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> Penetr
     let mut iterations = 0;
     loop {
         let n = border.len();
-        // Signed distance of the origin inside the edge that starts at vertex i.
+        // Distance of the edge that starts at vertex i from the origin, positive if the origin is inside.
         let edge = |i: usize| {
             let outward = -(border[(i + 1) % n] - border[i]).perp().normalize();
             (i, outward, outward.dot(border[i]))
@@ -67,7 +65,7 @@ pub fn penetration(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> Penetr
         iterations += 1;
         let progress = outward.dot(vertex) - distance;
         if progress <= TOLERANCE * size || border.contains(&vertex) || iterations >= MAX_ITERATIONS {
-            // M is b less a: moving b along the inward normal takes the origin out.
+            // M is b minus a: moving b along the inward normal moves the origin out of M.
             return Penetration { depth: distance, normal: -outward, iterations };
         }
         border.insert(i + 1, vertex);

@@ -1,37 +1,37 @@
-//! Distance of two convex cores by their support functions alone.
+//! Distance of two convex cores, using only their support functions.
 //!
-//! The distance is that of the origin from M = B ⊖ A. Keep a simplex of one or two
-//! vertices of M and v, its point nearest to the origin; the support of M against v
-//! bounds the distance from below by v·w/|v|. Stop when v meets the bound; else add w
-//! and drop what the new nearest point does not need.
+//! The distance is that of the origin from M = B ⊖ A. Keep a simplex of one or two vertices of M and its
+//! point v nearest to the origin. The support w of M in direction −v bounds the distance from below by
+//! v·w/|v|. Stop if |v| meets the bound. Otherwise add w and drop the vertex that the new nearest point does
+//! not need.
 //!
-//! Everything is `f64`, so against the `f32` shapes it serves as the truth.
+//! Everything is `f64`, so the result serves as a reference for `f32` shapes.
 //!
 //! Source: Gilbert, Johnson, Keerthi, IEEE J. Robot. Autom. 4(2), 1988.
 
 use crate::engine::shapes::{Pose, Shape};
 use glam::DVec2;
 
-/// Nearest points of two cores (the shapes without their radii). Where the cores
-/// overlap, the points are any two vertices.
+/// Nearest points of two cores (the shapes without their radii). If the cores overlap, the points are
+/// arbitrary vertices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoreDistance {
-    /// m; 0 where the cores share a point.
+    /// Distance (m); 0 if the cores share a point.
     pub distance: f64,
-    /// Nearest point of a, from a's center of mass, world axes (m).
+    /// Nearest point of a, relative to a's center of mass, world axes (m).
     pub point_a: DVec2,
-    /// Nearest point of b, from a's center of mass, world axes (m).
+    /// Nearest point of b, relative to a's center of mass, world axes (m).
     pub point_b: DVec2,
-    /// Unit vector from a to b; zero where the distance is.
+    /// Unit vector from a to b; zero if the distance is zero.
     pub normal: DVec2,
-    /// Supports evaluated after the first.
+    /// Number of supports evaluated after the first.
     pub iterations: u32,
 }
 
-/// Relative progress below which the distance is final: rounding in `f64`, with room.
+/// Relative progress below which the distance is final: rounding in `f64`, with a reserve.
 const TOLERANCE: f64 = 1.0e-14;
 
-/// Every step of a convergent run brings a new vertex of M, which has at most 16.
+/// Every step of a convergent run finds a new vertex of M, which has at most 16.
 const MAX_ITERATIONS: u32 = 64;
 
 /// Distance of the cores of `a` and `b`.
@@ -58,7 +58,7 @@ pub fn distance(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> CoreDista
     }
 }
 
-/// A vertex of M with the points of a and b it is the difference of.
+/// A vertex of M, and the points of a and b whose difference it is.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SupportVertex {
     pub position: DVec2,
@@ -66,7 +66,7 @@ pub(super) struct SupportVertex {
     point_b: DVec2,
 }
 
-/// The vertices of both cores, world axes, from a's center of mass.
+/// The vertices of both cores, world axes, relative to a's center of mass.
 pub(super) struct Cores {
     a: Vec<DVec2>,
     b: Vec<DVec2>,
@@ -102,8 +102,8 @@ impl Cores {
     }
 }
 
-/// One or two vertices of M (the second unused if its weight is 0) and the
-/// barycentric weights of the nearest point.
+/// One or two vertices of M (the second unused if its weight is 0) and the barycentric weights of the nearest
+/// point.
 #[derive(Clone, Copy, Debug)]
 struct Simplex {
     support: [SupportVertex; 2],
@@ -119,7 +119,7 @@ impl Simplex {
     fn segment(p: SupportVertex, q: SupportVertex) -> Simplex {
         let edge = q.position - p.position;
         let t = -p.position.dot(edge) / edge.length_squared();
-        // Not a number where p = q.
+        // NaN if p = q.
         if t.is_nan() || t <= 0.0 {
             Simplex { support: [p, q], weight: [1.0, 0.0] }
         } else if t >= 1.0 {
@@ -129,19 +129,19 @@ impl Simplex {
         }
     }
 
-    /// The nearest simplex of this one and `w`; `None` if the three surround the origin.
+    /// The nearest simplex formed by this one and `w`; `None` if the three vertices surround the origin.
     fn extended(&self, w: SupportVertex) -> Option<Simplex> {
         let [p, q] = self.support;
         if self.weight[1] == 0.0 {
             return Some(Simplex::segment(p, w));
         }
-        // The origin is inside if all three edges see it on the side of the third vertex.
+        // The origin is inside if it is on the same side of all three edges.
         let side = |u: SupportVertex, v: SupportVertex| u.position.perp_dot(v.position);
         let (s0, s1, s2) = (side(p, q), side(q, w), side(w, p));
         if (s0 >= 0.0 && s1 >= 0.0 && s2 >= 0.0) || (s0 <= 0.0 && s1 <= 0.0 && s2 <= 0.0) {
             return None;
         }
-        // Outside, the nearest point is on an edge at w: v was nearest on p–q.
+        // Outside, the nearest point is on an edge at w, since v was nearest on p–q.
         let (first, second) = (Simplex::segment(p, w), Simplex::segment(q, w));
         Some(if first.nearest().length_squared() <= second.nearest().length_squared() {
             first

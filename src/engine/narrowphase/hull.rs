@@ -1,4 +1,4 @@
-//! Polygons, capsules and segments as the lane kernels read them.
+//! Polygons, capsules and segments in the form used by the lane kernels.
 
 use crate::engine::lanes::{LaneIndex, Lanes, MOST_LANES, Quad};
 use crate::engine::params::MAX_POLYGON_VERTICES;
@@ -8,28 +8,28 @@ use glam::Vec2;
 
 /// A rounded convex hull in its body's frame, counter-clockwise: nine quads.
 ///
-/// Slots past the last vertex repeat it and its face. A repeated vertex changes no minimum over
-/// vertices and a repeated face no maximum over faces, so kernels may run over more slots than a
-/// hull has. Where values tie they prefer the later slot: the last slot that they run over,
-/// after which comes vertex 0, then stands for the last vertex however many there are.
+/// Slots past the last vertex repeat it and its face. A repeated vertex changes no minimum over vertices, and
+/// a repeated face no maximum over faces, so kernels may process more slots than a hull has. In ties they
+/// prefer the later slot. So the last slot processed, which is followed by vertex 0, stands for the last
+/// vertex, however many there are.
 ///
-/// A capsule or segment is the rectangle a, a, b, b of no width. Its two end faces have no length
-/// but a normal along the axis; without them no axis would tell collinear capsules apart. The side
-/// to the left of a → b is the last, and so the one that a point on the axis is nearest to.
+/// A capsule or segment is the rectangle a, a, b, b of zero width. Its two end faces have no length, but a
+/// normal along the axis; without them no axis would separate collinear capsules. The side to the left of a →
+/// b comes last, so it is the nearest face of a point on the axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub struct HullRow {
-    /// Rounding radius (m), slot of the last vertex, 1 for a capsule or segment, and 0.
+    /// Rounding radius (m), slot of the last vertex, 1 for a capsule or segment (else 0), and 0.
     pub head: [f32; 4],
-    /// Each vertex and the outward normal of the face from it to the next: `[x, y, nx, ny]` (m, 1).
+    /// Each vertex with the outward normal of the face from it to the next: `[x, y, nx, ny]` (m, 1).
     pub corners: [[f32; 4]; MAX_POLYGON_VERTICES],
 }
 
-/// Quads of a [`HullRow`].
+/// Number of quads in a [`HullRow`].
 const STRIDE: usize = size_of::<HullRow>() / 16;
 
 impl HullRow {
-    /// The row of a shape; a circle has none.
+    /// The row of a shape; the default row for a circle.
     pub fn new(shape: &Shape) -> Self {
         let corner = |v: Vec2, n: Vec2| [v.x, v.y, n.x, n.y];
         let flat = |a: Vec2, b: Vec2, radius: f32| {
@@ -52,19 +52,19 @@ impl HullRow {
 
 /// Hulls in lanes.
 pub struct Hull<L> {
-    /// As [`HullRow::corners`]. Only so many slots are filled as the batch has.
+    /// As [`HullRow::corners`]. Only the slots used by the batch are filled.
     pub corners: [[L; 4]; MAX_POLYGON_VERTICES],
     /// As [`HullRow::head`].
     pub head: [L; 4],
 }
 
 impl<L: Lanes> Hull<L> {
-    /// Room for hulls.
+    /// Empty buffers.
     pub fn empty() -> Self {
         Hull { corners: [[L::zero(); 4]; MAX_POLYGON_VERTICES], head: [L::zero(); 4] }
     }
 
-    /// Reads the heads of `L::WIDTH` hulls and returns the largest number of slots that one has.
+    /// Reads the heads of `L::WIDTH` hulls; returns the largest number of slots of any of them.
     #[inline(always)]
     pub fn gather_heads(&mut self, rows: &[HullRow], index: LaneIndex<L::Index>) -> usize {
         if let Some(row) = index.only() {
@@ -77,7 +77,7 @@ impl<L: Lanes> Hull<L> {
         (most as usize + 1).min(MAX_POLYGON_VERTICES)
     }
 
-    /// Reads the first `count` corners of `L::WIDTH` hulls and moves each by `place`.
+    /// Reads the first `count` corners of `L::WIDTH` hulls and transforms each by `place`.
     #[inline(always)]
     pub fn gather_corners(
         &mut self,

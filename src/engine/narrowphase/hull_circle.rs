@@ -1,9 +1,9 @@
-//! A rounded hull and a circle, in lanes: the nearest point of the core to the circle's center.
+//! A rounded hull and a circle, in lanes: the point of the core nearest to the circle's center.
 //!
-//! The face farthest below the center carries that point (see [`super::hulls`], with a single
-//! point for the other hull). With h the height of the center over that face, and o by how far it
-//! is past one of its ends, the center is h n + o n⊥ from it: along n itself over the face, so
-//! that long segments round nothing, and inside the core.
+//! That point lies on the face with the largest height h of the center above it (see [`super::hulls`], with a
+//! single point as the other hull). Let o be the distance of the center past an end of the face, or 0. The
+//! center is at h n + o n⊥ from the point. Over the face and inside the core that is along n itself, so a
+//! long segment adds no rounding error.
 
 use super::Margins;
 use super::circles::{PASSING, Rolling, arrival};
@@ -11,17 +11,17 @@ use super::hull::{Hull, HullRow};
 use super::lanes::{Poses, ShapeRow, Touch, abs, dot, perp, rotate, unrotate, way_between};
 use crate::engine::lanes::{LaneIndex, Lanes, MOST_LANES};
 
-/// Hulls as a, circles as b.
+/// Hulls (as a) and circles (as b).
 pub struct HullCircle<L> {
     hull: Hull<L>,
     /// The circle's center in its body's frame, and its radius (m).
     circle: ([L; 2], L),
-    /// Slots in use.
+    /// Number of slots in use.
     count: usize,
 }
 
 impl<L: Lanes> HullCircle<L> {
-    /// Room for `L::WIDTH` pairs.
+    /// Empty buffers for `L::WIDTH` pairs.
     pub fn empty() -> Self {
         HullCircle { hull: Hull::empty(), circle: ([L::zero(); 2], L::zero()), count: 0 }
     }
@@ -35,16 +35,17 @@ impl<L: Lanes> HullCircle<L> {
         self.circle = ([place[0], place[1]], size[2]);
     }
 
-    /// Displacement of the circle's center in the frame of the hull when bodies move by `[x, y, θ, 0]` (m, rad).
+    /// Displacement of the circle's center in the hull's frame when bodies move by `[x, y, θ, 0]` (m, rad).
     #[inline(always)]
     fn way(&self, poses: &Poses<L>, ways: [[L; 4]; 2]) -> [L; 2] {
         let center = rotate(poses.rotation[1], self.circle.0);
         way_between(ways, [[poses.centers[0] + center[0], poses.centers[1] + center[1]], center])
     }
 
-    /// Their contacts in the coming step, in which bodies move by `ways` (`[x, y, θ, 0]`, m and rad); those farther apart
-    /// than `margins.speculative` (m) are left out. At a corner gaps are those of two circles that pass ([`super::circles`]).
-    /// And their radii of curvature, where `rolling` requests them, of the hull and of the circle.
+    /// Contacts in the coming step, in which bodies move by `ways` (`[x, y, θ, 0]`, m and rad); those farther
+    /// apart than `margins.speculative` (m) are omitted. Also returns their gaps, which at a corner are those
+    /// of two passing circles ([`super::circles`]), and the radii of curvature of hull and circle if
+    /// `rolling` is given, otherwise zeros.
     #[inline(always)]
     pub fn in_step(
         &self,
@@ -74,7 +75,7 @@ impl<L: Lanes> HullCircle<L> {
         let (along, length) = (dot(t, [c[0] - x, c[1] - y]), dot(t, [next_x - x, next_y - y]));
         let past = along - along.min(length).max(zero);
         let slant = height.mul_add(height, past * past).sqrt();
-        // Past an end, and farther than a length without a direction.
+        // Past an end, and not too close to define a direction.
         let corner = height.min(abs(past)).min(slant - L::splat(f32::MIN_POSITIVE));
         let distance = corner.select_positive(slant, height);
         let inverse = one / corner.select_positive(slant, one);
@@ -89,7 +90,7 @@ impl<L: Lanes> HullCircle<L> {
             let (up, aside) = (dot(n, way), dot(t, way));
             let toward = height.mul_add(up, past * aside);
             let length_of = |x: L, y: L| x.mul_add(x, y * y).sqrt();
-            // Where it is at the end: above the face, or past one of its ends.
+            // Position at the end of the step: above the face, or past one of its ends.
             let (over, along) = (height + up, along + aside);
             let end = length_of(over, along - along.min(length).max(zero));
             let straight = inverse.mul_add(toward, distance);
@@ -111,7 +112,8 @@ impl<L: Lanes> HullCircle<L> {
         if let Some(rolling) = rolling {
             let rolls = rolling.rolls(dot(normal, way));
             gap = rolls.select_positive(separation, gap);
-            // When it is as far away as it is when it touches, it still has to be past the same end, and above the face.
+            // When the circle is at touching distance, it must still be past the same end, and above the
+            // face.
             let reach = distance - separation;
             let [part, comes] = arrival(dot(normal, way) * distance, dot(way, way), [distance, reach]);
             let part = comes.select_positive(part, zero);
@@ -124,8 +126,8 @@ impl<L: Lanes> HullCircle<L> {
         }
         let normal = rotate(rotation_a, normal);
         let between = poses.centers;
-        // From the circle's center: for a circle centered on its body the anchor is a multiple of the
-        // normal, and friction is all that turns it. a's follows from the centers of mass.
+        // Relative to the circle's center: for a circle centered on its body the anchor is a multiple of the
+        // normal, so only friction can turn it. a's anchor follows from the centers of mass.
         let arm = half.mul_add(separation, radius);
         let anchor_b = [arm.neg_mul_add(normal[0], center[0]), arm.neg_mul_add(normal[1], center[1])];
         let anchor_a = [anchor_b[0] + between[0], anchor_b[1] + between[1]];

@@ -1,18 +1,17 @@
 //! Two rounded hulls, in lanes: separating axis test, then two faces or a pair of vertices.
 //!
-//! **Axis.** Let M be the Minkowski difference of the cores. Its edges are the faces
-//! of both, and the distance of the origin from the line of a face is that face's
-//! separation, nᵢ·(nearest vertex − vᵢ). If the cores overlap, the face of largest
-//! (least negative) separation gives the depth exactly. If they are apart, that face
-//! carries the point of M closest to the origin, inside it or at one of its ends:
-//! for any face whose line is no farther than that of a face at the closest vertex V
-//! has its normal farther from V's direction, and then lies behind V.
+//! **Axis.** Let M be the Minkowski difference of the cores. Its edges are the faces of both, and the
+//! distance of the origin from the line of a face is that face's separation, nᵢ·(nearest vertex − vᵢ). If the
+//! cores overlap, the face with the largest (least negative) separation gives the depth exactly. If they are
+//! separate, that face contains the point of M closest to the origin, in its interior or at one of its ends.
+//! Proof: let V be the closest vertex. A face whose line is no farther than that of a face at V has its
+//! normal farther from V's direction, and then lies behind V.
 //!
-//! **Features.** So with that reference face v₁v₂ and deepest vertex q of the other hull,
-//! the closest pair is (face, q) if q projects between v₁ and v₂, else the face's end and the
-//! nearest point of the other hull. What becomes of the two faces, [`super::clip`] says.
+//! **Features.** With that reference face v₁v₂ and the deepest vertex q of the other hull, the closest pair
+//! is (face, q) if q projects between v₁ and v₂. Otherwise it is the face's end and the nearest point of the
+//! other hull. [`super::clip`] computes the points from the two faces.
 //!
-//! **Coordinates** are along a's axes from b's center of mass: only b's corners are turned.
+//! **Coordinates** are along a's axes, relative to b's center of mass, so only b's corners are rotated.
 //!
 //! Source: Gottschalk, Lin, Manocha 1996 (separating axes).
 
@@ -22,22 +21,22 @@ use super::hull::{Hull, HullRow};
 use super::lanes::{Poses, Touch, dot, perp, rotate, unrotate};
 use crate::engine::lanes::{LaneIndex, Lanes, MOST_LANES};
 
-/// Hulls a and b and the incident one of the two, along a's axes from b's center of mass.
+/// Hulls a and b and the incident one of the two, along a's axes, relative to b's center of mass.
 pub struct Hulls<L> {
     hulls: [Hull<L>; 2],
     incident: Hull<L>,
-    /// Slots in use: the most that one hull of the batch has. Loops unrolled for 3, 4 and 5 of them
-    /// were tried: 3 % slower on triangles and pentagons.
+    /// Slots in use: the largest number of any hull of the batch. Loops unrolled for 3, 4 and 5 slots were
+    /// tried: 3 % slower on triangles and pentagons.
     count: usize,
 }
 
 impl<L: Lanes> Hulls<L> {
-    /// Room for `L::WIDTH` pairs.
+    /// Empty buffers for `L::WIDTH` pairs.
     pub fn empty() -> Self {
         Hulls { hulls: [Hull::empty(), Hull::empty()], incident: Hull::empty(), count: 0 }
     }
 
-    /// Reads `L::WIDTH` pairs, which stand at `poses`.
+    /// Reads `L::WIDTH` pairs at `poses`.
     #[inline(always)]
     pub fn gather(&mut self, poses: &Poses<L>, rows: &[HullRow], [a, b]: [LaneIndex<L::Index>; 2]) {
         let [rotation_a, rotation_b] = poses.rotation;
@@ -52,7 +51,7 @@ impl<L: Lanes> Hulls<L> {
         });
     }
 
-    /// Their contacts; points farther apart than `speculative` (m) are left out.
+    /// Contacts of the pairs; points farther apart than `margins.speculative` (m) are omitted.
     #[inline(always)]
     pub fn collide(&mut self, poses: &Poses<L>, margins: Margins) -> Touch<L> {
         let (zero, count) = (L::zero(), self.count);
@@ -61,7 +60,7 @@ impl<L: Lanes> Hulls<L> {
         let (face_a, face_b) = (HullFace::best(corners_a, corners_b), HullFace::best(corners_b, corners_a));
         let flush = L::splat(FLUSH) - dot(face_a.normal, face_b.normal);
         let preference = flush.select_positive(L::splat(REFERENCE_TOLERANCE * margins.slop), zero);
-        // Where positive, b's face is the reference.
+        // If positive, b's face is the reference.
         let flip = face_b.gap - (face_a.gap + preference);
         let pick = |b: L, a: L| flip.select_positive(b, a);
         let both = |b: [L; 2], a: [L; 2]| [pick(b[0], a[0]), pick(b[1], a[1])];
@@ -105,7 +104,7 @@ impl<L: Lanes> Hulls<L> {
 }
 
 impl Hulls<f32> {
-    /// A single pair, which stands at `poses`.
+    /// A single pair at `poses`.
     pub fn new(poses: &Poses<f32>, rows: &[HullRow; 2]) -> Self {
         let mut hulls = Self::empty();
         hulls.gather(poses, rows, [LaneIndex::new(&[0; MOST_LANES]), LaneIndex::new(&[1; MOST_LANES])]);
@@ -113,7 +112,7 @@ impl Hulls<f32> {
     }
 }
 
-/// A face of a hull: the best of those looked at by some measure, `gap`.
+/// The face of a hull with the largest value of some measure, `gap`.
 struct HullFace<L> {
     gap: L,
     normal: [L; 2],
@@ -124,8 +123,8 @@ struct HullFace<L> {
 }
 
 impl<L: Lanes> HullFace<L> {
-    /// The face of `hull` from which `other` is farthest, and how far that is (m):
-    /// max over faces i of min over vertices j of nᵢ·(wⱼ − vᵢ).
+    /// The face of `hull` with the largest separation from `other` (m): max over faces i of min over vertices
+    /// j of nᵢ·(wⱼ − vᵢ).
     #[inline(always)]
     fn best(hull: &[[L; 4]], other: &[[L; 4]]) -> Self {
         Self::largest(hull, |[x, y, nx, ny]| {
@@ -144,7 +143,7 @@ impl<L: Lanes> HullFace<L> {
         Self::largest(hull, |[_, _, nx, ny]| -dot(direction, [nx, ny]))
     }
 
-    /// The last of the faces for which `gap` is largest.
+    /// The face with the largest `gap`; the last of them in a tie.
     #[inline(always)]
     fn largest(hull: &[[L; 4]], gap: impl Fn([L; 4]) -> L) -> Self {
         let zero = [L::zero(); 2];
@@ -167,8 +166,8 @@ impl<L: Lanes> HullFace<L> {
     }
 }
 
-/// Feature ids of the two ends of the face at `slot`: its number and the next; for a capsule or segment (`flat`
-/// positive) 0 at a and 1 at b.
+/// Vertex numbers of the two ends of the face at `slot`: its number and the next. For a capsule or segment
+/// (`flat` positive): 0 at a and 1 at b.
 #[inline(always)]
 fn names<L: Lanes>(slot: L, last: L, flat: L) -> [L; 2] {
     let one = L::splat(1.0);
@@ -177,11 +176,11 @@ fn names<L: Lanes>(slot: L, last: L, flat: L) -> [L; 2] {
     [slot, next].map(|i| flat.select_positive((i - L::splat(1.5)).select_positive(one, L::zero()), i))
 }
 
-/// The way from `e` to the nearest point of the boundary of `hull`.
+/// The vector from `e` to the nearest point of the boundary of `hull`.
 ///
-/// From the face at v it is −(h n + o n⊥), h the height of e over the face's line, and o by how far
-/// e is past one of its ends along it. A repeated vertex is a face with o = (e − v)·n⊥, and so never
-/// nearer than the face after it, which it repeats.
+/// For the face at v it is −(h n + o n⊥), where h is the height of e over the face's line, and o the distance
+/// of e past one of its ends. A repeated vertex is a face with o = (e − v)·n⊥, and so never nearer than the
+/// next face, which it repeats.
 #[cold]
 #[inline(never)]
 fn nearest<L: Lanes>(hull: &[[L; 4]], e: [L; 2]) -> [L; 2] {

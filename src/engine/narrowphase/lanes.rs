@@ -1,4 +1,4 @@
-//! Data that the narrow phase reads and writes in lanes.
+//! Lane data read and written by the narrow phase.
 
 use crate::engine::contacts::{Manifold, ManifoldPoint};
 use crate::engine::lanes::{LaneIndex, Lanes, Quad};
@@ -10,21 +10,21 @@ use glam::Vec2;
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub struct PoseRow {
-    /// Center of mass and what it is short of: `[x, y, x rest, y rest]` (m).
+    /// Center of mass and its low part: `[x, y, x_lo, y_lo]` (m).
     pub position: [f32; 4],
-    /// `[cos θ, sin θ, 1 if no impulse moves it, 0]`
+    /// `[cos θ, sin θ, 1 if impulses do not move it, 0]`
     pub rotation: [f32; 4],
 }
 
 impl PoseRow {
-    /// A pose without rests.
+    /// A pose with zero low part.
     pub fn new(pose: &Pose) -> Self {
         let (p, q) = (pose.position, pose.rotation);
         PoseRow { position: [p.x, p.y, 0.0, 0.0], rotation: [q.x, q.y, 0.0, 0.0] }
     }
 }
 
-/// Properties of a shape that kernels distinguish.
+/// Shape classes that kernels distinguish.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Class {
     /// A polygon with four right angles.
@@ -44,17 +44,16 @@ pub enum Class {
 pub struct ShapeRow {
     /// `[center x, center y, axis x, axis y]` (m, 1): the axis is the outward normal of face 1.
     pub place: [f32; 4],
-    /// Half extents along the axis and across it, rounding radius (m), and 0. A circle has the
-    /// radius alone.
+    /// Half extents along and across the axis, rounding radius (m), and 0. For a circle only the radius is
+    /// non-zero.
     pub size: [f32; 4],
 }
 
-/// Corners may be this far from those of the rectangle through them, relative to its size (1):
-/// a few roundings.
+/// Largest distance of corners from those of the fitted rectangle, relative to its size (1): a few roundings.
 const RECTANGLE_TOLERANCE: f32 = 1e-6;
 
 impl ShapeRow {
-    /// The row of a shape and its class. A shape that is neither rectangle nor circle has none.
+    /// The class of a shape and its row. A shape that is neither rectangle nor circle gets the default row.
     pub fn new(shape: &Shape) -> (Class, Self) {
         match *shape {
             Shape::Circle { center, radius } => {
@@ -70,7 +69,7 @@ impl ShapeRow {
         }
     }
 
-    /// The row of a rectangle, rounded or not.
+    /// The row of a rectangle, rounded or not; `None` for other polygons.
     fn rectangle(polygon: &Polygon) -> Option<Self> {
         let v @ [_, _, _, _] = polygon.vertices() else { return None };
         let axis = polygon.normals[1];
@@ -93,7 +92,7 @@ impl ShapeRow {
     /// `place` and `size` of `L::WIDTH` rows.
     #[inline(always)]
     pub fn gather<L: Lanes>(rows: &[ShapeRow], index: LaneIndex<L::Index>) -> [[L; 4]; 2] {
-        // Spreading a single row, as hulls do, was tried: 0 % on the washer's equal boxes.
+        // Tried: broadcasting a single row, as for hulls. It gained 0 % on the washer's equal boxes.
         let rows: &[Quad] = bytemuck::cast_slice(rows);
         [L::gather_quads::<2, 0>(rows, index), L::gather_quads::<2, 1>(rows, index)]
     }
@@ -106,7 +105,7 @@ pub struct Poses<L> {
     pub centers: [L; 2],
     /// Rotations of a and b, (cos, sin).
     pub rotation: [[L; 2]; 2],
-    /// Whether no impulse moves a and b: 1, else 0.
+    /// 1 if impulses do not move the body (a, b), else 0.
     pub held: [L; 2],
 }
 
@@ -118,7 +117,7 @@ impl<L: Lanes> Poses<L> {
         let (p, q) = (L::gather_quads::<2, 0>(poses, a), L::gather_quads::<2, 0>(poses, b));
         let (r, s) = (L::gather_quads::<2, 1>(poses, a), L::gather_quads::<2, 1>(poses, b));
         Poses {
-            // As `Bodies::relative_poses`: the rests make it as good far out as at the origin.
+            // As `Bodies::relative_poses`: the low parts make it as accurate far from the origin as near it.
             centers: [(q[0] - p[0]) + (q[2] - p[2]), (q[1] - p[1]) + (q[3] - p[3])],
             rotation: [[r[0], r[1]], [s[0], s[1]]],
             held: [r[2], s[2]],
@@ -134,14 +133,14 @@ impl<L: Lanes> Poses<L> {
 }
 
 impl Poses<f32> {
-    /// Two poses of bodies that impulses move.
+    /// Poses of two bodies that impulses move.
     pub fn new(a: &Pose, b: &Pose) -> Self {
         let rotation = [a.rotation.into(), b.rotation.into()];
         Poses { centers: (b.position - a.position).into(), rotation, held: [0.0; 2] }
     }
 }
 
-/// Two shapes that are all said in a [`ShapeRow`] each, and the poses of their bodies, in lanes.
+/// Two shapes fully described by a [`ShapeRow`] each, and the poses of their bodies, in lanes.
 pub struct ShapePair<L> {
     /// Poses.
     pub poses: Poses<L>,
@@ -170,7 +169,8 @@ impl<L: Lanes> ShapePair<L> {
     }
 }
 
-/// Displacement of the point at `r[1]` from the center of b relative to that at `r[0]` from a's, world axes (m).
+/// Displacement of the point at `r[1]` from b's center relative to the point at `r[0]` from a's, in world
+/// axes (m).
 #[inline(always)]
 pub fn way_between<L: Lanes>(ways: [[L; 4]; 2], r: [[L; 2]; 2]) -> [L; 2] {
     let of =
@@ -179,47 +179,46 @@ pub fn way_between<L: Lanes>(ways: [[L; 4]; 2], r: [[L; 2]; 2]) -> [L; 2] {
     [bx - ax, by - ay]
 }
 
-/// Manifolds without impulses, in lanes. Points from `count` on mean nothing.
+/// Manifolds without impulses, in lanes. Points from `count` on have no meaning.
 pub struct Touch<L> {
     /// Unit normal from a to b.
     pub normal: [L; 2],
     /// Points in use: 0, 1 or 2.
     pub count: L,
-    /// Per point, from the center of mass of a (m).
+    /// Anchor of each point, from the center of mass of a (m).
     pub anchor_a: [[L; 2]; 2],
-    /// Per point, from the center of mass of b (m).
+    /// Anchor of each point, from the center of mass of b (m).
     pub anchor_b: [[L; 2]; 2],
-    /// Per point, signed gap (m).
+    /// Signed gap of each point (m).
     pub separation: [L; 2],
-    /// Per point, the feature id as a number.
+    /// Feature id of each point, as a float.
     pub feature: [L; 2],
-    /// Positive where flush faces are apart, and face each other by no more than a graze.
+    /// Positive if flush faces are separate, and their overlap along the faces is no more than a graze.
     pub passes: L,
 }
 
 impl<L: Lanes> Touch<L> {
-    /// The same contacts with a and b exchanged, for points that are all named 0.
+    /// The same contacts with a and b exchanged, for points whose ids are all 0.
     #[inline(always)]
     pub fn swapped(self) -> Self {
         let normal = self.normal.map(|x| -x);
         Touch { normal, anchor_a: self.anchor_b, anchor_b: self.anchor_a, ..self }
     }
 
-    /// Without contacts of flush faces that are apart and graze each other. In a step, in which contacts look ahead,
-    /// they would stop a box that slides over a floor of tiles at the side of the next one, which it overlaps by
-    /// micrometers.
+    /// Removes contacts of separate flush faces that only graze each other. In a step contacts look ahead. A
+    /// box sliding over a floor of tiles overlaps the side of the next tile by micrometers, and such a
+    /// contact would stop it.
     #[inline(always)]
     pub fn without_grazes(self) -> Self {
         Touch { count: self.passes.select_positive(L::zero(), self.count), ..self }
     }
 
-    /// The same contacts with points on the surface of b where `held` is 1, midway between both surfaces
-    /// where it is 0.
+    /// The same contacts with points on the surface of b if `held` is 1, and midway between both surfaces if
+    /// it is 0.
     ///
-    /// Points have to be the same for two bodies that move, or impulses would change their angular momentum.
-    /// A body on a held one has friction at its own surface: a disc that overlaps the ground by s and slides at v
-    /// rolls away at v/(1 + I/(m r a)) with the arm a. That is 2/3 v with a = r, and 2/9 s/r v less
-    /// with a = r − s/2.
+    /// Two moving bodies must share the point, or impulses would change their angular momentum. A body on a
+    /// held one has friction at its own surface: a disc that overlaps the ground by s and slides at v rolls
+    /// away at v/(1 + I/(m r a)) with the arm a. That is 2/3 v for a = r, and 2/9 s/r v less for a = r − s/2.
     #[inline(always)]
     pub fn on_held(self, held: L) -> Self {
         let [nx, ny] = self.normal;
@@ -235,7 +234,7 @@ impl<L: Lanes> Touch<L> {
 }
 
 impl<L: Lanes> Touch<L> {
-    /// The same contact of one point with another gap (m).
+    /// The same one-point contact with another gap (m).
     #[inline(always)]
     pub fn with_gap(self, gap: L) -> Self {
         Touch { separation: [gap, self.separation[1]], ..self }
@@ -263,13 +262,13 @@ impl Touch<f32> {
     }
 }
 
-/// v turned by (cos, sin).
+/// v rotated by (cos, sin).
 #[inline(always)]
 pub fn rotate<L: Lanes>(q: [L; 2], v: [L; 2]) -> [L; 2] {
     [q[0] * v[0] - q[1] * v[1], q[1] * v[0] + q[0] * v[1]]
 }
 
-/// v turned by the inverse of (cos, sin).
+/// v rotated by the inverse of (cos, sin).
 #[inline(always)]
 pub fn unrotate<L: Lanes>(q: [L; 2], v: [L; 2]) -> [L; 2] {
     [q[0] * v[0] + q[1] * v[1], q[0] * v[1] - q[1] * v[0]]
@@ -281,7 +280,7 @@ pub fn dot<L: Lanes>(a: [L; 2], b: [L; 2]) -> L {
     a[0].mul_add(b[0], a[1] * b[1])
 }
 
-/// v turned left by a right angle.
+/// v rotated left by a right angle.
 #[inline(always)]
 pub fn perp<L: Lanes>(v: [L; 2]) -> [L; 2] {
     [-v[1], v[0]]

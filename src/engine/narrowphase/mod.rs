@@ -1,19 +1,16 @@
-//! Contact geometry: two shapes at two poses in, one [`Manifold`] out.
+//! Contact geometry: takes two shapes at two poses, returns one [`Manifold`].
 //!
-//! Every shape is a convex core grown by a radius, so a signed distance is that
-//! of the cores less both radii. Two circles ([`circles`]) need one square root; a
-//! circle against anything ([`hull_circle`]) needs the closest point of a core; all
-//! other pairs are two hulls (polygon, capsule, segment) under the separating axis
-//! test ([`hulls`]), which for two [`rectangles`] has a closed form. Each kernel is
-//! written in lanes; [`batch`] runs it over the pairs of a step.
+//! Every shape is a convex core grown by a radius, so a signed distance is that of the cores minus both
+//! radii. Two circles ([`circles`]) need one square root. A circle against any other shape ([`hull_circle`])
+//! needs the closest point of a core. All other pairs are two hulls (polygon, capsule, segment) and use the
+//! separating axis test ([`hulls`]), which has a closed form for two [`rectangles`]. Each kernel is written
+//! in lanes; [`batch`] runs it over the pairs of a step.
 //!
-//! Only the difference of the positions enters, so a scene loses nothing far
-//! from the origin beyond the rounding of that difference. Coordinates are then
-//! relative to b's center of mass: where one body is large it is the ground,
-//! which is a, and what is small about the contact keeps its digits.
+//! Only the difference of the positions enters, so far from the origin a scene loses no precision beyond the
+//! rounding of that difference. Coordinates are then relative to b's center of mass: a large body is usually
+//! the ground, which is a, so the small quantities of the contact keep their digits.
 //!
-//! [`gjk`] and [`epa`] answer the same questions independently, in `f64`,
-//! to check this one.
+//! [`gjk`] and [`epa`] compute the same quantities independently, in `f64`, to check this module.
 
 #[doc(hidden)]
 pub mod batch;
@@ -48,19 +45,17 @@ use lanes::{Poses, ShapePair, ShapeRow, Touch};
 
 /// Contact of shape `a` with shape `b`, each in the frame of its body's center of mass.
 ///
-/// The normal points from a to b, in world axes. Points farther apart than
-/// `speculative_distance` (m, ≥ 0) are left out; without points the manifold is the
-/// default one. Each point lies midway between the two surfaces; `anchor_a − anchor_b`
-/// is the difference of the centers of mass, to rounding.
+/// The normal points from a to b, in world axes. Points farther apart than `speculative_distance` (m, ≥ 0)
+/// are omitted; without points the manifold is the default one. Each point lies midway between the two
+/// surfaces; `anchor_a − anchor_b` is the difference of the centers of mass, up to rounding.
 ///
-/// `feature_id` is `vertex of a | vertex of b << 8` for two hulls: each end of the
-/// contact is named by the vertex of a and the vertex of b that bound it there, so the
-/// name survives when the reference face passes from one shape to the other. With a
-/// circle there is only one point, and its id is always 0.
+/// `feature_id` is `vertex of a | vertex of b << 8` for two hulls: each end of the contact is identified by
+/// the vertex of a and the vertex of b that bound it, so the id stays the same when the reference face
+/// changes from one shape to the other. With a circle there is only one point, and its id is always 0.
 ///
-/// Where the geometry does not define a normal, it is still a unit vector: (0, 1) for
-/// coincident circle centers, the left side of a → b for a circle centered on a segment
-/// or capsule axis, the nearest face for a circle centered in a polygon.
+/// If the geometry does not define a normal, the normal is still a unit vector: (0, 1) for coincident circle
+/// centers, the left side of a → b for a circle centered on a segment or capsule axis, the nearest face for a
+/// circle centered in a polygon.
 ///
 /// Two segments never touch: neither has mass.
 pub fn collide(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, speculative_distance: f32) -> Manifold {
@@ -68,9 +63,9 @@ pub fn collide(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, speculative_d
         .map_or_else(Manifold::default, |pair| pair.collide([pose_a, pose_b], speculative_distance))
 }
 
-/// As [`collide`], for the coming step, in which bodies move by `ways` if nothing hinders them (`[x, y, θ, 0]`, m and
-/// rad), and whether no impulse moves that of `a`: then points lie on the surface of `b`. Without grazes, which bodies
-/// slide over.
+/// As [`collide`], for the coming step. Unhindered bodies would move by `ways` (`[x, y, θ, 0]`, m and rad).
+/// If `a_is_held`, the body of `a` is not moved by impulses, and points lie on the surface of `b`. Grazes,
+/// which bodies slide over, are omitted.
 pub fn collide_in_step(
     [a, b]: [&Shape; 2],
     poses: [&Pose; 2],
@@ -83,37 +78,37 @@ pub fn collide_in_step(
     })
 }
 
-/// Small distances of a collision.
+/// Distance thresholds of a collision.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Margins {
-    /// Points farther apart are left out (m).
+    /// Points farther apart are omitted (m).
     pub speculative: f32,
-    /// Overlap that position correction leaves alone (m).
+    /// Overlap that position correction leaves uncorrected (m).
     pub slop: f32,
 }
 
 impl Margins {
-    /// Of bodies of about `length_unit` (m).
+    /// For bodies of a typical size of `length_unit` (m).
     pub fn of(length_unit: f32) -> Self {
         Margins { speculative: SPECULATIVE_DISTANCE * length_unit, slop: LINEAR_SLOP * length_unit }
     }
 
-    /// Of bodies of about a meter, to points that are so far apart (m).
+    /// For bodies of a typical size of 1 m, with points up to `speculative` apart (m).
     pub fn within(speculative: f32) -> Self {
         Margins { speculative, slop: LINEAR_SLOP }
     }
 }
 
-/// Two shapes as kernels read them, to be collided at several poses.
+/// Two shapes in kernel form, for collisions at several poses.
 pub(crate) struct Collider {
     kind: PairKind,
     rows: [ShapeRow; 2],
-    /// Of what is neither rectangle nor circle.
+    /// Rows of shapes that are neither rectangles nor circles.
     hulls: [HullRow; 2],
 }
 
 impl Collider {
-    /// None for two segments.
+    /// `None` for two segments.
     pub(crate) fn new(a: &Shape, b: &Shape) -> Option<Self> {
         let ((class_a, row_a), (class_b, row_b)) = (ShapeRow::new(a), ShapeRow::new(b));
         let kind = PairKind::of(class_a, class_b)?;
@@ -132,7 +127,7 @@ impl Collider {
         self.touch(poses, [[0.0; 4]; 2], false, Margins::within(speculative_distance)).manifold()
     }
 
-    /// As [`collide_in_step`], including grazes. What lanes do in a step is done here with one lane: the same bits.
+    /// As [`collide_in_step`], including grazes. Uses one lane, with the same bits as the lanes of a step.
     fn touch(
         &self,
         [pose_a, pose_b]: [&Pose; 2],

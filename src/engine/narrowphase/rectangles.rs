@@ -1,17 +1,17 @@
-//! Two rounded rectangles, in lanes: what [`super::hulls`] does, in closed form and without branches.
+//! Two rounded rectangles, in lanes: the same as [`super::hulls`], in closed form and without branches.
 //!
-//! A rectangle is its center, an axis u, and half extents along u and u⊥. All four of its faces
-//! face along ±u or ±u⊥, so with d from the center of a to that of b, the face of a toward b
-//! along axis w is farthest from b by
+//! A rectangle is given by its center, an axis u, and half extents along u and u⊥. All its faces are normal
+//! to ±u or ±u⊥. With d from the center of a to that of b, the separation of b from the face of a toward b
+//! along axis w is
 //!
 //! ```text
 //! |d·w| − h_w − (|w·u_b| h_bx + |w·u_b⊥| h_by)                                          (1)
 //! ```
 //!
-//! The face of largest (1) over both rectangles is the reference face (why, see [`super::hulls`]); b's
-//! only if it is better by a tolerance where both are flush. The incident face is the one of the
-//! other rectangle most opposed to its normal. What the two have in common is the matter of
-//! [`super::clip`].
+//! The face with the largest (1) over both rectangles is the reference face (see [`super::hulls`] for the
+//! reason). If the faces are flush, b's is chosen only if it is better by a tolerance. The incident face is
+//! the face of the other rectangle most opposed to the normal of the reference face. [`super::clip`] computes
+//! their contact.
 //!
 //! Source: Gottschalk, Lin, Manocha 1996 (separating axes).
 
@@ -20,7 +20,7 @@ use super::clip::{self, FLUSH, Faces, REFERENCE_TOLERANCE};
 use super::lanes::{Poses, ShapePair, Touch, abs, dot, perp, rotate};
 use crate::engine::lanes::Lanes;
 
-/// Contacts of the rectangles of `pair`; points farther apart than `margins.speculative` (m) are left out.
+/// Contacts of the rectangles of `pair`; points farther apart than `margins.speculative` (m) are omitted.
 #[inline(always)]
 pub fn collide<L: Lanes>(pair: &ShapePair<L>, margins: Margins) -> Touch<L> {
     let (zero, one) = (L::zero(), L::splat(1.0));
@@ -35,7 +35,7 @@ pub fn collide<L: Lanes>(pair: &ShapePair<L>, margins: Margins) -> Touch<L> {
     let radii = size_a[2] + size_b[2];
     let reach = L::splat(margins.speculative) + radii;
 
-    // (1) for every axis. |u_a·u_b| and |u_a·u_b⊥| are all the projections there are.
+    // (1) for every axis. |u_a·u_b| and |u_a·u_b⊥| are all the projections needed.
     let (c, s) = (abs(dot(u_a, u_b)), abs(dot(perp(u_a), u_b)));
     let gap = |along: L, own: L, x: L, y: L| abs(along) - (own + c.mul_add(x, s * y));
     let [ax, ay] = [dot(d, u_a), dot(d, perp(u_a))];
@@ -44,13 +44,13 @@ pub fn collide<L: Lanes>(pair: &ShapePair<L>, margins: Margins) -> Touch<L> {
     let (gap_bx, gap_by) = (gap(bx, h_b[0], h_a[0], h_a[1]), gap(by, h_b[1], h_a[1], h_a[0]));
     let (a_is_x, b_is_x) = (gap_ax - gap_ay, gap_bx - gap_by);
     let face_a = RectangleFace::new(a_is_x, u_a, [ax, ay], h_a);
-    // The face of b toward a looks against d.
+    // The face of b toward a faces against d.
     let face_b = RectangleFace::new(b_is_x, u_b, [-bx, -by], h_b);
     let (gap_a, gap_b) = (gap_ax.max(gap_ay), gap_bx.max(gap_by));
 
     let flush = L::splat(FLUSH) - dot(face_a.normal, face_b.normal);
     let preference = flush.select_positive(L::splat(REFERENCE_TOLERANCE * margins.slop), zero);
-    // Where positive, b's face is the reference.
+    // If positive, b's face is the reference.
     let flip = gap_b - (gap_a + preference);
     let pick = |b: L, a: L| flip.select_positive(b, a);
     let n = [pick(face_b.normal[0], face_a.normal[0]), pick(face_b.normal[1], face_a.normal[1])];
@@ -59,11 +59,11 @@ pub fn collide<L: Lanes>(pair: &ShapePair<L>, margins: Margins) -> Touch<L> {
     let first = pick(face_b.index, face_a.index);
     let (r_radius, i_radius) = (pick(size_b[2], size_a[2]), pick(size_a[2], size_b[2]));
 
-    // The incident rectangle: its axis in (N, T), its half extents.
+    // The incident rectangle: its axis in (N, T) and its half extents.
     let u_i = [pick(u_a[0], u_b[0]), pick(u_a[1], u_b[1])];
     let u = [dot(u_i, n), dot(u_i, t)];
     let h_i = [pick(h_a[0], h_b[0]), pick(h_a[1], h_b[1])];
-    // The center of a, seen from that of b.
+    // The center of a relative to that of b.
     let a = [-dot(d, n), -dot(d, t)];
     let (r_center, i_center) = ([pick(zero, a[0]), pick(zero, a[1])], [pick(a[0], zero), pick(a[1], zero)]);
 
@@ -106,14 +106,14 @@ pub fn collide<L: Lanes>(pair: &ShapePair<L>, margins: Margins) -> Touch<L> {
     })
 }
 
-/// The face of a rectangle that looks along `toward`, given by its parts along u and u⊥.
+/// The face of a rectangle in the direction `toward`, given by its components along u and u⊥.
 struct RectangleFace<L> {
     normal: [L; 2],
     /// Half extent along the normal.
     across: L,
     /// Half extent along the face.
     along: L,
-    /// Number of the face and of its first vertex.
+    /// Index of the face and of its first vertex.
     index: L,
 }
 
@@ -132,7 +132,7 @@ impl<L: Lanes> RectangleFace<L> {
     }
 }
 
-/// Faces are numbered −u⊥, u, u⊥, −u, each from the vertex of its number to the next.
+/// Faces are numbered −u⊥, u, u⊥, −u. Each runs from the vertex with its number to the next.
 #[inline(always)]
 fn index<L: Lanes>(is_x: L, x: L, y: L) -> L {
     is_x.select_positive(L::splat(2.0) - x, L::splat(1.0) + y)

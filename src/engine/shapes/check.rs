@@ -1,4 +1,4 @@
-//! Valid ranges of the numbers of a shape.
+//! Valid ranges of the values of a shape.
 
 use crate::engine::error::Error;
 use glam::Vec2;
@@ -9,12 +9,12 @@ pub const MAX_COORDINATE: f32 = 1.0e9;
 /// Smallest length, radius or half extent (m), so that fourth powers do not vanish in `f32`.
 pub const MIN_LENGTH: f32 = 1.0e-9;
 
-/// Least area of a polygon, relative to the square of its diameter (1). Below,
-/// its thickness is no more than a hundred roundings of its coordinates.
+/// Minimum area of a polygon, relative to the square of its diameter (1). Below, its thickness is no more
+/// than a hundred roundings of its coordinates.
 pub const MIN_RELATIVE_AREA: f64 = 1.0e-5;
 
-/// Least sine of the turn from one polygon edge to the next (1), and least
-/// distance of two vertices relative to the diameter.
+/// Minimum sine of the angle between consecutive polygon edges (1), and minimum distance of two vertices
+/// relative to the diameter.
 pub const MIN_RELATIVE_TURN: f64 = 1.0e-4;
 
 pub(super) fn check_point(place: &str, name: &str, value: Vec2) -> Result<(), Error> {

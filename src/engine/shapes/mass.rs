@@ -6,11 +6,11 @@ use std::f64::consts::TAU;
 /// Mass (kg), center of mass (m) and inertia about that center (kg·m²).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MassProperties {
-    /// kg
+    /// Mass (kg).
     pub mass: f64,
-    /// m, in the frame the shape is given in
+    /// Center of mass (m), in the frame of the shape.
     pub center: [f64; 2],
-    /// kg·m², about `center`
+    /// Inertia about `center` (kg·m²).
     pub inertia: f64,
 }
 
@@ -23,8 +23,8 @@ impl MassProperties {
     }
 }
 
-/// Several parts as one body. With the center c = Σ mᵢcᵢ / Σ mᵢ, the parallel axis
-/// theorem moves each inertia: I = Σ Iᵢ + mᵢ|cᵢ − c|². Without mass: [`MassProperties::ZERO`].
+/// Combines several parts into one body. With the center c = Σ mᵢcᵢ / Σ mᵢ, the parallel axis theorem moves
+/// each inertia: I = Σ Iᵢ + mᵢ|cᵢ − c|². Returns [`MassProperties::ZERO`] if the parts have no mass.
 pub fn combine(parts: &[MassProperties]) -> MassProperties {
     let mass: f64 = parts.iter().map(|p| p.mass).sum();
     if mass <= 0.0 {
@@ -35,10 +35,10 @@ pub fn combine(parts: &[MassProperties]) -> MassProperties {
     MassProperties::new(mass, center, parts.iter().map(moved).sum())
 }
 
-/// A hull of two or more vertices, counter-clockwise, grown by r.
+/// Mass properties of a hull of two or more vertices, counter-clockwise, grown by r.
 ///
-/// Growing adds to the core one rectangle of ℓ × r per edge and one disc sector
-/// per vertex, whose angle θ is the turn there (they sum to 2π):
+/// Growing adds to the core one rectangle of ℓ × r per edge and one disc sector per vertex, whose angle θ is
+/// the turn there (they sum to 2π):
 /// - triangle (0, p, q) of the fan: area ½ p×q, centroid (p + q)/3, inertia
 ///   about the apex m (p·p + p·q + q·q)/6;
 /// - rectangle: inertia about its center m (ℓ² + r²)/12;
@@ -49,7 +49,7 @@ pub fn combine(parts: &[MassProperties]) -> MassProperties {
 pub(super) fn rounded_hull_mass(core: &[DVec2], r: f64, density: f64) -> MassProperties {
     let n = core.len();
     let mut parts = Vec::with_capacity(3 * n);
-    // Inertia about a centroid at distance |c| from where it is known.
+    // Parallel axis theorem, for a centroid at offset c from the apex.
     let part = |mass: f64, apex: DVec2, c: DVec2, inertia_about_apex: f64| {
         MassProperties::new(mass, apex + c, inertia_about_apex - mass * c.length_squared())
     };
@@ -66,7 +66,7 @@ pub(super) fn rounded_hull_mass(core: &[DVec2], r: f64, density: f64) -> MassPro
         let center = 0.5 * (v + next) + 0.5 * r * normal;
         parts.push(MassProperties::new(mass, center, mass * (length * length + r * r) / 12.0));
 
-        // In (0, 2π): a turn of exactly π may come out as −π.
+        // In (0, 2π): `atan2` may return −π for a turn of exactly π.
         let angle = before.perp_dot(normal).atan2(before.dot(normal)).rem_euclid(TAU);
         let mass = density * 0.5 * angle * r * r;
         let reach = 4.0 * r / (3.0 * angle) * (0.5 * angle).sin();

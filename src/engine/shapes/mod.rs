@@ -1,8 +1,8 @@
 //! Convex shapes in their body's frame: mass properties, bounds, validation.
 //!
-//! Every shape is a convex *core* (point, segment or polygon) grown by a
-//! *radius*. The constructors of [`Shape`] are the only checked way in; what
-//! they accept never makes the code behind them produce a NaN.
+//! Every shape is a convex *core* (point, segment or polygon) grown by a *radius*. The constructors of
+//! [`Shape`] are the only checked way to create one. Shapes that they accept never cause a NaN in later
+//! computations.
 
 mod check;
 mod mass;

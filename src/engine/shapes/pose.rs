@@ -1,4 +1,4 @@
-//! Where a shape stands, and boxes around it.
+//! Poses and bounding boxes.
 
 use glam::Vec2;
 
@@ -17,7 +17,7 @@ impl Pose {
         Self { position, rotation: Vec2::from_angle(angle) }
     }
 
-    /// A point of the body's frame in the world (m).
+    /// World coordinates of a point given in the body's frame (m).
     #[inline]
     pub fn apply(&self, point: Vec2) -> Vec2 {
         self.position + self.rotation.rotate(point)
@@ -34,7 +34,7 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// Whether the two share a point; touching counts.
+    /// Whether the two overlap; touching counts.
     #[inline]
     pub fn overlaps(&self, other: &Aabb) -> bool {
         // Not short-circuited: four predictable comparisons beat four branches.
@@ -50,7 +50,7 @@ impl Aabb {
         Aabb { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// These bounds moved outwards by `margin` (m) on every side.
+    /// These bounds expanded by `margin` (m) on every side.
     #[inline]
     pub fn grown(&self, margin: f32) -> Aabb {
         Aabb { min: self.min - Vec2::splat(margin), max: self.max + Vec2::splat(margin) }

@@ -15,8 +15,8 @@ use std::f64::consts::PI;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Polygon {
-    /// The first `count` are used (m); the others repeat the last of them, so
-    /// that code of fixed width may read all eight.
+    /// The first `count` are used (m); the others repeat the last one, so that fixed-width code may read all
+    /// eight.
     pub vertices: [Vec2; MAX_POLYGON_VERTICES],
     /// Outward unit normal of the edge from vertex i to vertex i + 1; padded like `vertices`.
     pub normals: [Vec2; MAX_POLYGON_VERTICES],
@@ -45,33 +45,33 @@ impl Polygon {
 pub enum Shape {
     /// All points within `radius` of `center`.
     Circle {
-        /// m
+        /// Center (m).
         center: Vec2,
-        /// m, > 0
+        /// Radius (m), > 0.
         radius: f32,
     },
     /// All points within `radius` of the segment a–b.
     Capsule {
-        /// m
+        /// First end of the axis (m).
         a: Vec2,
-        /// m
+        /// Second end of the axis (m).
         b: Vec2,
-        /// m, > 0
+        /// Radius (m), > 0.
         radius: f32,
     },
     /// A rounded convex polygon.
     Polygon(Polygon),
     /// A two-sided line without mass.
     Segment {
-        /// m
+        /// First end (m).
         a: Vec2,
-        /// m
+        /// Second end (m).
         b: Vec2,
     },
 }
 
 impl Shape {
-    /// A circle. `place` names the shape in errors, here and below.
+    /// A circle. `place` identifies the shape in errors, here and below.
     ///
     /// Errors: a value that is not finite or out of range, `radius` ≤ 0.
     pub fn circle(place: &str, center: Vec2, radius: f32) -> Result<Shape, Error> {
@@ -100,7 +100,7 @@ impl Shape {
     /// `center`, then grown by `radius` ≥ 0.
     ///
     /// Errors: a value that is not finite or out of range, a half extent ≤ 0, `radius` < 0.
-    /// There is no sliver bound: the normals do not come from the vertices.
+    /// There is no sliver limit, since the normals are not computed from the vertices.
     pub fn rectangle(place: &str, half: Vec2, center: Vec2, angle: f32, radius: f32) -> Result<Shape, Error> {
         check_length(place, "half_width", half.x)?;
         check_length(place, "half_height", half.y)?;
@@ -124,9 +124,9 @@ impl Shape {
 
     /// A convex polygon of 3 to 8 vertices in either winding, grown by `radius` ≥ 0.
     ///
-    /// Errors, naming the vertex by its index in `vertices`: not finite or out of
-    /// range; coincident with another vertex; collinear with its neighbors
-    /// ([`MIN_RELATIVE_TURN`]); not convex; a sliver ([`MIN_RELATIVE_AREA`]); `radius` < 0.
+    /// Errors, naming the vertex by its index in `vertices`: not finite or out of range; coincident with
+    /// another vertex; collinear with its neighbors ([`MIN_RELATIVE_TURN`]); not convex; a sliver
+    /// ([`MIN_RELATIVE_AREA`]); `radius` < 0.
     pub fn polygon(place: &str, vertices: &[Vec2], radius: f32) -> Result<Shape, Error> {
         let n = vertices.len();
         if !(3..=MAX_POLYGON_VERTICES).contains(&n) {
@@ -162,8 +162,8 @@ impl Shape {
             if turn.abs() < MIN_RELATIVE_TURN {
                 return fail(i + 1, "is collinear with its neighbors");
             }
-            // Left turns alone would also accept a star that winds twice, so
-            // every vertex must lie to the left of every edge.
+            // Left turns alone would also accept a star that winds twice, so every vertex must lie to the
+            // left of every edge.
             if turn < 0.0 {
                 return fail(i + 1, "makes the polygon concave");
             }
@@ -183,7 +183,8 @@ impl Shape {
         Ok(Shape::Polygon(Polygon::padded(&ordered, &normals, radius)))
     }
 
-    /// Whether its coordinates and radius are in range: the fields are public, and a shape may have been moved.
+    /// Checks that coordinates and radius are in range: the fields are public, and shapes may have been
+    /// translated.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let mut result = Ok(());
         self.for_each_vertex(|v| {
@@ -265,8 +266,8 @@ impl Shape {
         Aabb { min: pose.position + min, max: pose.position + max }.grown(self.radius())
     }
 
-    /// The point of the shape farthest along `direction` (m, body frame); the
-    /// first such core vertex, without the radius, if `direction` is zero.
+    /// The point of the shape farthest along `direction` (m, body frame); the first core vertex, without the
+    /// radius, if `direction` is zero.
     pub fn support(&self, direction: Vec2) -> Vec2 {
         let (mut best, mut height) = (Vec2::ZERO, f32::NEG_INFINITY);
         self.for_each_vertex(|v| {
@@ -277,21 +278,21 @@ impl Shape {
         best + self.radius() * direction.normalize_or_zero()
     }
 
-    /// Distance of its farthest point from the origin, the center of mass of its body in a world (m).
+    /// Distance of the farthest point from the origin, which is the body's center of mass in a world (m).
     pub fn reach(&self) -> f32 {
         let mut reach = 0.0_f32;
         self.for_each_vertex(|v| reach = reach.max(v.length()));
         reach + self.radius()
     }
 
-    /// Half the smallest width of the shape (m); deeper overlap is past its middle. Infinite for a segment, which has
-    /// no inside, so the minimum over a pair is that of the other shape.
+    /// Half the smallest width of the shape (m); deeper overlap is past its middle. Infinite for a segment,
+    /// which has no interior, so the minimum over a pair is that of the other shape.
     pub fn min_half_extent(&self) -> f32 {
         match self {
             Shape::Circle { radius, .. } | Shape::Capsule { radius, .. } => *radius,
             Shape::Segment { .. } => f32::INFINITY,
             Shape::Polygon(polygon) => {
-                // The least width of a convex polygon is across one of its faces.
+                // The smallest width of a convex polygon is perpendicular to one of its faces.
                 let width = |i: usize| {
                     let depth = |&v: &Vec2| polygon.normals[i].dot(polygon.vertices[i] - v);
                     polygon.vertices().iter().map(depth).fold(0.0, f32::max)

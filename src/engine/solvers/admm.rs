@@ -1,15 +1,18 @@
-//! The alternating direction method of multipliers: a linear problem and a projection take turns
-//! until they agree. The linear problem is factorized once a step and again where its penalty changes.
+//! The alternating direction method of multipliers: a linear problem and a projection take turns until they
+//! agree. The linear problem is factorized once per step, and again when the penalty changes.
 //!
-//! **Source.** `carpentier2024` (a cached factor, an adaptive penalty, the law of `desaxce1998`: friction as one cone, of
-//! which µ |ut| is part of the normal velocity); `boyd2011`, section 3 (the method, and residual balancing, 3.4.1).
+//! **Source.** `carpentier2024` (a cached factor, an adaptive penalty, the law of `desaxce1998`: friction as
+//! one cone, with µ |ut| added to the normal velocity); `boyd2011`, section 3 (the method, and residual
+//! balancing, 3.4.1).
 //!
-//! **Departures.** The factor is that of the bodies' velocities instead of that of the contacts', which is as large for two
-//! points a contact as for one. ρ is scaled by each point's effective mass, the same along n and t; it is balanced on the
-//! ratio of residuals by its square root, at most every `adapt_every` iterations, while the source multiplies it by fixed
-//! powers of the ratio of extreme eigenvalues. No proximal term: rows that depend on each other need none in the space of the bodies.
-//! The multiplier starts where the contact law puts it: at −u where points slide or open, at zero where they hold. Rows of joints are in the same vectors, with their bounds in
-//! place of cones. A factor that would be larger than `factor_limit` is replaced by ten steps of conjugate gradients.
+//! **Departures.** The factorized matrix is in the space of body velocities instead of contact impulses, so
+//! its size does not depend on the number of points per contact. ρ is scaled by each point's effective mass,
+//! the same along n and t. It changes by the square root of the ratio of residuals, at most every
+//! `adapt_every` iterations; the source multiplies it by fixed powers of the ratio of extreme eigenvalues.
+//! There is no proximal term: in the space of the bodies, linearly dependent rows need none. The multiplier
+//! starts where the contact law puts it: at −u where points slide or open, at zero where they hold. Joint
+//! rows are in the same vectors, with their bounds instead of cones. If a factor would be larger than
+//! `factor_limit`, ten steps of conjugate gradients replace it.
 //!
 //! **Agreement.** The source at its best: ρ by problem, until both residuals are reached. Here: 20 iterations,
 //! baumgarte 0.3, penalty 0.3, adapt_every 5, factor_limit 16. Apart from the solution in `f64` after 2000
@@ -20,8 +23,8 @@
 //! and 1 substitution, n b operations for n = 3 rows a body in a band of b; n b²/2 of a factorization, of which a step has 1 to
 //! 4. Sweeps of a step request 10971 B per contact.
 //!
-//! **Fails when** bands are wide: a pyramid of base m has b = 3 m. Where things slide a small ρ is slow, where
-//! loads are carried down a column a large one is, and the step begins with one for all.
+//! **Fails when** bands are wide: a pyramid of base m has b = 3 m. A small ρ is slow for sliding contacts, a
+//! large ρ for loads that are carried down a column, and a step begins with one ρ for all contacts.
 //!
 //! # The method
 //!
@@ -30,15 +33,15 @@
 //! z = Π(λ + w),   w ← w + λ − z
 //! ```
 //!
-//! with the cone of friction Π and scaled multipliers w; where both agree, u + (µ |ut|, 0) = −ρ D⁻¹ w
-//! is in the polar cone, which is Coulomb's law.
+//! with the friction cone Π and scaled multipliers w. When λ and z agree, u + (µ |ut|, 0) = −ρ D⁻¹ w is in
+//! the polar cone, which is Coulomb's law.
 //!
 //! # The penalty
 //!
-//! λ converges by ρ/(ρ + κ) an iteration for each eigenvalue κ of D^(1/2) K D^(1/2) of what stays in contact: small ρ is fast,
-//! and κ falls with the square of the height of a column. What slides has its cone turned by u, which moves by ρ an
-//! iteration: large ρ is fast. The residuals tell which it is: λ − z is zero in a column, and in a slide it is some hundred
-//! times ρ D⁻¹ Δz.
+//! For each eigenvalue κ of D^(1/2) K D^(1/2) of the contacts that persist, λ converges by ρ/(ρ + κ) per
+//! iteration. Small ρ is therefore fast, and κ falls with the square of the height of a column. The cone of a
+//! sliding contact is shifted by u, which moves in proportion to ρ per iteration: there, large ρ is fast. The
+//! residuals tell the two cases apart: λ − z is zero in a column, and some hundred times ρ D⁻¹ Δz in a slide.
 
 use super::{Law, Variant};
 use crate::engine::clock::Phase;
@@ -92,24 +95,24 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// Ratio of the two residuals that the penalty aims at, and how far off it has to be: the square root of what is missing,
-/// within [`GREATEST_CHANGE`].
+/// Target ratio of the primal residual to the dual one. The penalty is multiplied by the square root of ratio
+/// ÷ target, by [`GREATEST_CHANGE`] at most. It changes only by a factor of more than [`TOLERATED`].
 const BALANCE: f64 = 30.0;
 const TOLERATED: f64 = 10.0;
 const GREATEST_CHANGE: f64 = 30.0;
-/// Residuals that are as small as this beside λ tell nothing of the penalty (1).
+/// If both residuals are below this fraction of λ, the penalty is left alone (1).
 const SMALL: f64 = 1e-5;
 /// Bounds of the penalty.
 const PENALTIES: [f64; 2] = [1e-4, 1.0];
-/// Steps of conjugate gradients in the place of a factor.
+/// Steps of conjugate gradients that replace a factor.
 const LINEAR_STEPS: usize = 10;
 
-/// Memory of the method, and the step at work.
+/// State of the method, and buffers of the current step.
 #[derive(Clone, Debug, Default)]
 struct Admm {
     matrix: BodyMatrix,
     joints: JointBlocks,
-    /// v without any impulse, and what impulses add to it (m/s, rad/s).
+    /// v without impulses, and the change of v by impulses (m/s, rad/s).
     free: Vec<[f64; 3]>,
     added: Vec<[f64; 3]>,
     change: Vec<[f64; 3]>,
@@ -117,7 +120,7 @@ struct Admm {
     is_factorized: bool,
 }
 
-/// AdmmVectors of a substep.
+/// Vectors of a substep.
 struct AdmmVectors {
     /// b, and µ.
     bias: PointVector,
@@ -130,11 +133,11 @@ struct AdmmVectors {
     w: PointVector,
     /// J v + b
     u: PointVector,
-    /// z − w − (µ |ut|, 0) D/ρ, where λ is at u = 0.
+    /// z − w − (µ |ut|, 0) D/ρ: λ at u = 0.
     target: PointVector,
     trial: PointVector,
     image: PointVector,
-    /// Of conjugate gradients.
+    /// Search direction of conjugate gradients.
     direction: PointVector,
 }
 
@@ -178,7 +181,7 @@ impl Solver for Admm {
                 passes.iteration_done();
             }
             passes.with_system(Phase::Solve, |system| {
-                // What is kept is z, which is in the cones, and velocities are those of z.
+                // The kept impulses are z, which are within the cones; velocities become those of z.
                 for (row, free) in system.rows().iter_mut().zip(&self.free) {
                     (0..3).for_each(|k| row.velocity[k] = free[k] as f32);
                 }
@@ -199,8 +202,8 @@ impl Solver for Admm {
 }
 
 impl Admm {
-    /// λ = z = what is there, and w what x = λ − D (u + (µ |ut|, 0)) is outside of the cone, by ρ: where a point slides or opens
-    /// that is −u D/ρ; where it holds, what is left of u is no multiplier.
+    /// Starts from λ = z = the current impulses and w = (x − Π(x))/ρ, where x = λ − D (u + (µ |ut|, 0)).
+    /// Where a point slides or opens, w is −u D/ρ. Where it holds, the remaining u is not a multiplier.
     fn begin(&mut self, system: &mut System<'_>, v: &mut AdmmVectors, rule: Baumgarte) {
         system.lane_surfaces(&mut v.bias);
         update([&mut v.bias], [], |[b], []| [[rule.bias(b[0]), b[1]]]);
@@ -253,7 +256,7 @@ impl Admm {
             [z, difference(both, z)]
         });
         if system.has_joints() {
-            // Of joints z is λ + w by now, and w zero.
+            // For joints, z is now λ + w, and w is zero.
             v.trial.clone_from(&v.z);
             system.bound_lanes(&mut v.z);
             update([&mut v.w], [&v.trial, &v.z], |[w], [both, z]| [sum(w, difference(both, z))]);
@@ -264,15 +267,15 @@ impl Admm {
         system.set_lane_impulses(&mut v.z);
     }
 
-    /// Velocities of the linear problem, in the space of the bodies: with S = (C⁻¹ + R)⁻¹
+    /// Solves the linear problem for velocities, in the space of the bodies. With S = (C⁻¹ + R)⁻¹:
     ///
     /// ```text
     /// (M + Jᵀ S J) δ = Jᵀ S (C⁻¹ target − u) − M Δv,    Δv ← Δv + δ,   u ← u + J δ
     /// ```
     ///
-    /// u and Δv follow the small δ, so that no rounding of large velocities is divided by ρ.
+    /// u and Δv are updated by the small δ, so that rounding errors of large velocities are not divided by ρ.
     fn solve(&mut self, system: &mut System<'_>, v: &mut AdmmVectors) {
-        // λ = (1 + C R)⁻¹ (target − C u), before and after.
+        // λ = (1 + C R)⁻¹ (target − C u), before and after the solve.
         let impulses = |system: &mut System<'_>, v: &mut AdmmVectors| {
             update([&mut v.lambda], [&v.target, &v.u, &v.compliance], |_, [t, u, c]| {
                 [difference(t, product(c, u))]
@@ -297,8 +300,8 @@ impl Admm {
         self.show(system);
     }
 
-    /// Some steps of conjugate gradients on (K + R + C⁻¹) λ = C⁻¹ target − J v − b, from the last λ on, preconditioned by
-    /// D/(1 + ρ): rows of soft joints are stiffer than contacts by any factor.
+    /// A few steps of conjugate gradients on (K + R + C⁻¹) λ = C⁻¹ target − J v − b, starting at the last λ.
+    /// Preconditioned by D/(1 + ρ), because rows of soft joints can be stiffer than contacts by any factor.
     fn solve_by_gradients(&mut self, system: &mut System<'_>, v: &mut AdmmVectors) {
         let share = 1.0 / (1.0 + self.penalty as f32);
         let before = |r: PointEntry, m: PointEntry| scaled(share, product(m, r));
@@ -320,7 +323,7 @@ impl Admm {
             if square <= 0.0 {
                 break;
             }
-            // K p is what the impulses p make of J v alone.
+            // K p is J v when the impulses p alone give v.
             system.rows().iter_mut().for_each(|row| row.velocity[..3].fill(0.0));
             system.push_lanes(&mut v.direction);
             velocities(system.rows(), &mut self.change);
@@ -353,14 +356,14 @@ impl Admm {
         update([&mut v.u], [&v.bias], |[u], [b]| [[u[0] + b[0], u[1]]]);
     }
 
-    /// Velocities of the bodies are those of λ.
+    /// Sets the velocities of the bodies to those of λ.
     fn show(&self, system: &mut System<'_>) {
         for ((row, free), added) in system.rows().iter_mut().zip(&self.free).zip(&self.added) {
             (0..3).for_each(|k| row.velocity[k] = (free[k] + added[k]) as f32);
         }
     }
 
-    /// Residual balancing: λ − z and ρ D⁻¹ Δz in units of energy.
+    /// Residual balancing: compares λ − z with ρ D⁻¹ Δz, in units of energy.
     fn adapt(&mut self, system: &mut System<'_>, v: &mut AdmmVectors) {
         let energy = |x: &PointVector, y: &PointVector| {
             sum_of_products([x, y, &v.mass], |[x, y, m]| {
@@ -389,12 +392,12 @@ impl Admm {
     }
 }
 
-/// Entry by entry.
+/// Entrywise product.
 fn product(x: PointEntry, y: PointEntry) -> PointEntry {
     [x[0] * y[0], x[1] * y[1]]
 }
 
-/// u + (µ |ut|, 0), the second entry of `bias` being µ.
+/// u + (µ |ut|, 0); the second entry of `bias` is µ.
 fn with_slide(u: PointEntry, bias: PointEntry) -> PointEntry {
     let slide = bias[1].max(Wide::zero()) * Lanes::max(u[1], -u[1]);
     [u[0] + slide, u[1]]

@@ -1,11 +1,12 @@
-//! Accelerated projected gradients on the convex relaxation of friction: Nesterov's method on
-//! ½ λᵀ K λ + bᵀ λ with every λ in its cone.
+//! Accelerated projected gradients on the convex relaxation of friction: Nesterov's method on ½ λᵀ K λ + bᵀ
+//! λ, with every λ in its cone.
 //!
 //! **Source.** `mazhar2015`, algorithm of section 4; `anitescu2006` (the relaxation).
 //!
-//! **Departures.** Steps are scaled by each point's effective mass, the same along n and t, so that a
-//! cone stays one. L is kept from step to step, which takes 0.90 to 0.97 of the time. Gradients at extrapolated points are extrapolated, as the problem is linear.
-//! Rows of joints are in the same vectors, each scaled by its own mass and projected on its bounds.
+//! **Departures.** Steps are scaled by each point's effective mass, the same along n and t, so that a cone
+//! stays a cone. L is kept from step to step, which takes 0.90 to 0.97 of the time. The gradient at an
+//! extrapolated point is extrapolated as well, because the problem is linear. Joint rows are in the same
+//! vectors, each scaled by its own mass and projected on its bounds.
 //!
 //! **Agreement.** The source at its best: 50 iterations (Chrono), until a residual is reached. Here: 20 iterations,
 //! baumgarte 0.3. Apart from the source's method in `f64` over 10 iterations by less than 6e-5:
@@ -15,10 +16,9 @@
 //! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` times 2 passes over
 //! vectors in lanes, one more for each step that was too long. Sweeps of a step request 12203 B per contact.
 //!
-//! **Fails when** anything slides: the relaxation makes the surfaces part at µ times the speed of
-//! sliding. (A clamp of friction by the normal impulse has no such effect and no convex problem.) And
-//! when iterations are few, since its error falls by the square of their number, however few contacts
-//! there are.
+//! **Fails when** anything slides: the relaxation makes the surfaces separate at µ times the sliding speed.
+//! (Clamping friction by the normal impulse has no such effect, but is no convex problem.) Also when
+//! iterations are few: the error falls with the square of their number, however few contacts there are.
 //!
 //! # The method
 //!
@@ -26,8 +26,8 @@
 //! λ⁺ = Π(y − D g(y)/L),   θ⁺ = (√(θ⁴ + 4θ²) − θ²)/2,   y⁺ = λ⁺ + θ(1 − θ)/(θ² + θ⁺) (λ⁺ − λ)
 //! ```
 //!
-//! with g = J v(λ) + b, and L doubled until (λ⁺ − y)ᵀ K (λ⁺ − y) ≤ L |λ⁺ − y|²_{D⁻¹}. Where
-//! g·(λ⁺ − λ) > 0 momentum is dropped.
+//! with g = J v(λ) + b, and L doubled until (λ⁺ − y)ᵀ K (λ⁺ − y) ≤ L |λ⁺ − y|²_{D⁻¹}. If g·(λ⁺ − λ) > 0, the
+//! momentum is reset.
 
 use super::{Law, Variant};
 use crate::engine::clock::Phase;
@@ -55,9 +55,10 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// L shrinks by this factor per iteration, so that one steep place does not slow all that follow (1).
+/// Factor by which L shrinks per iteration, so that one place of high curvature does not slow down the
+/// following iterations (1).
 const FORGET: f64 = 0.9;
-/// Doublings of L in one iteration.
+/// Most doublings of L in one iteration.
 const DOUBLINGS: usize = 20;
 
 /// State from step to step.
@@ -94,7 +95,7 @@ fn step(passes: &mut Passes<'_>, steepness: &mut f64) {
             g_y.clone_from(&g_now);
         });
         let mut theta = 1.0_f64;
-        // Along a single row it is 1. It shrinks below that where nothing changes any more.
+        // For a single row, L is 1. It would decay below 1 once the impulses stop changing.
         *steepness = steepness.max(1.0);
         for _ in 0..budget.velocity_iterations {
             passes.with_system(Phase::Solve, |system| {
@@ -125,7 +126,7 @@ fn step(passes: &mut Passes<'_>, steepness: &mut f64) {
                     if curve <= *steepness * length * (1.0 + 1e-5) {
                         break;
                     }
-                    // Velocities back to those of `now`.
+                    // Restore the velocities of `now`.
                     update([&mut step], [], |[s], []| [scaled(-1.0, s)]);
                     system.push_lanes(&mut step);
                     *steepness *= 2.0;

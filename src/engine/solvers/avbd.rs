@@ -1,18 +1,19 @@
-//! Augmented vertex block descent: each body in turn moves to the balance of its inertia and the penalties of its
-//! contacts; multipliers and penalties grow until contacts hold.
+//! Augmented vertex block descent: each body in turn moves to where its inertia balances the penalty forces
+//! of its contacts. Multipliers and penalties grow until the contacts hold.
 //!
 //! **Source.** `giles2025`, algorithm 1, with the contact rows of its two-dimensional demonstration.
 //!
-//! The demonstration's defaults (10 iterations and one of post-stabilization at 60 Hz, β 10⁵, γ 0.99, a margin of 0.5 mm,
-//! sticking within 10 mm) are the defaults here.
+//! The demonstration's defaults are the defaults here: 10 iterations and one of post-stabilization at 60 Hz,
+//! β 10⁵, γ 0.99, a margin of 0.5 mm, sticking within 10 mm.
 //!
-//! **Departures.** Bodies go color by color; in natural order one by one, as the contacts name them. The acceleration
-//! of a body is measured along all its forces, not along gravity alone. A point that sticks keeps how far it has
-//! drifted, not its two anchors, so that along n it is where the manifold of the step has it. There is no geometric
-//! stiffness: rows are linear in the motion of a step. Contacts with a gap are rows, too, which let it close. The
-//! cone is that of the normal force of the same iteration, not of the last one. Spins have no limit. Springs of joints
-//! follow the law of springs here, exact at rest and in their decay (`avbd/joints.rs`); motors and springs have stiffness of
-//! their own instead of a penalty that grows.
+//! **Departures.** Bodies are solved color by color; in natural order one by one, in the order in which
+//! contacts refer to them. The acceleration of a body is measured along all its forces, not only along
+//! gravity. A sticking point stores its drift instead of its two anchors, so along n it is where the manifold
+//! of the step puts it. There is no geometric stiffness: rows are linear in the motion of a step. Contacts
+//! with a gap also have rows, which let the gap close. The cone is that of the normal force of the same
+//! iteration, not of the last one. Spins have no limit. Springs of joints follow this crate's spring law,
+//! which is exact at rest and in its decay (`avbd/joints.rs`). Motors and springs have their own stiffness
+//! instead of a growing penalty.
 //!
 //! **Agreement.** The source at its best: 10 iterations and 1 of post-stabilization, β 1e5, γ 0.99, margin 0.5 mm.
 //! Here: 10 iterations, 1 position sweep, alpha 0.99, beta 100000, gamma 0.99. Apart from the source's method in
@@ -23,15 +24,16 @@
 //! bodies with their contacts, each seen from both sides, and one over contacts, in lanes over the bodies of
 //! a color (`avbd/descent.rs`), and with their joints one by one. Sweeps of a step request 9477 B per contact.
 //!
-//! **Fails when** a loop of joints spins: penalties that have grown beyond M/h² lock bodies to where their neighbors are, and
-//! the loop as a whole turns too little in an iteration. A triangle of rods goes from 3 to 16 rad/s with 10 iterations or 50
-//! (`simpulse verify --cases A29`); with 500, or without growth, it loses speed as one step of implicit Euler does. Also when
-//! iterations are few for the height of a stack: a penalty needs them to grow, and
-//! descent carries a change by one body per iteration. In `f32` a body is lost where penalties exceed
-//! its inertia M/h² by more than seven digits. From zero, orders hardly matter: penalties begin at 1 N/m, M/h² of a
-//! unit box is 3600 N/m at 60 Hz, and while they are that soft a body does not feel in one iteration what its
-//! neighbors do in the same. Cold curves of all orders on the frozen pyramid of five differ by 2·10⁻⁵ after 100
-//! iterations and by 6·10⁻⁴ at most.
+//! **Fails when** a loop of joints spins. Penalties that have grown beyond M/h² lock each body to the
+//! positions of its neighbors, and the loop as a whole turns too little per iteration. A triangle of rods
+//! speeds up from 3 to 16 rad/s with 10 iterations or 50 (`simpulse verify --cases A29`); with 500, or
+//! without growth, it slows down as much as in one step of implicit Euler. Also when iterations are few for
+//! the height of a stack: a penalty needs them to grow, and descent carries a change by one body per
+//! iteration. In `f32`, the inertia M/h² of a body is lost to rounding where penalties exceed it by more than
+//! seven digits. After a cold start, the order of the bodies hardly matters: penalties begin at 1 N/m, M/h²
+//! of a unit box is 3600 N/m at 60 Hz, and with penalties that soft a body hardly reacts to what its
+//! neighbors do in the same iteration. On the frozen pyramid of five, the cold convergence curves of all
+//! orders differ by 2·10⁻⁵ after 100 iterations and by 6·10⁻⁴ at most.
 //!
 //! # The method
 //!
@@ -41,14 +43,14 @@
 //! (M/h² + Σ k JᵀJ) Δx = −M (x − y)/h² + Σ Jᵀ f,   f = λ − k C within its bounds
 //! ```
 //!
-//! where C = (1 − α) C₀ + J (x − x₀): the share α of what was wrong at the start is left alone. Bounds:
-//! f ≥ 0 along n, |f| ≤ µ f_n along t. Then λ ← f and, where f is within its bounds, k ← k + β |C|.
-//! From step to step k keeps the share γ.
+//! where C = (1 − α) C₀ + J (x − x₀): the fraction α of the initial error is left alone. Bounds: f ≥ 0 along
+//! n, |f| ≤ µ f_n along t. Then λ ← f and, where f is within its bounds, k ← k + β |C|. From step to step, k
+//! keeps the fraction γ.
 //!
-//! Old error comes out of positions alone, by post-stabilization: α = 1 in all iterations, so that forces and
-//! velocities know nothing of it, and λ stays whole from step to step; then velocities are taken, and `position_iterations`
-//! with α = 0 move bodies without a trace in velocities or multipliers. With none of those α is the parameter, and λ keeps
-//! the share α γ.
+//! Old errors are removed from positions only, by post-stabilization. In all iterations α = 1, so that old
+//! errors affect neither forces nor velocities, and λ is kept in full from step to step. Then velocities are
+//! computed, and `position_iterations` with α = 0 move bodies without changing velocities or multipliers.
+//! Without position iterations, α is the parameter, and λ keeps the fraction α γ.
 
 mod descent;
 mod input;
@@ -156,7 +158,7 @@ impl Solver for Avbd {
 }
 
 impl Avbd {
-    /// Gives bodies their lanes, once a step and before all else of it.
+    /// Assigns bodies to lanes, once per step and before everything else.
     fn assign(&mut self, passes: &mut Passes<'_>) {
         if !passes.runs(Phase::Solve) {
             return;
@@ -170,7 +172,8 @@ impl Avbd {
         self.descent.assign(rows, contacts, &self.graph, width, sequence);
     }
 
-    /// Every body takes a step of block descent; of errors at the start of the substep the share `alpha` is left alone.
+    /// Every body takes one step of block descent. The fraction `alpha` of the errors at the start of the
+    /// substep is left alone.
     fn descend(&mut self, passes: &mut Passes<'_>, phase: Phase, alpha: f32) {
         self.run(passes, phase, |descent, on| descent.descend(on, alpha));
         passes.count_sweep(2);
@@ -211,7 +214,7 @@ impl Avbd {
                 length_unit: input.length_unit,
             },
         );
-        // Each contact is looked at from both of its bodies, and the numbers of its points are kept.
+        // Each contact is read from both of its bodies, and the numbers of its points are written.
         let (contacts, size) = (contacts.len() as f64, 4.0 * kept.size().per_point as f64);
         clock.book_bytes([2.0 * contacts * (76.0 + 16.0 + 2.0 * size), 2.0 * contacts * size]);
         passes.book_rows([32.0, 16.0]);
@@ -219,8 +222,8 @@ impl Avbd {
     }
 }
 
-/// Writes the impulses h λ (N·s) of the forces that are kept per point into the records, rounded into their cones, for who
-/// asks what the contacts bore.
+/// Writes the impulses h λ (N·s) of the forces kept per point into the records, clamped to their cones
+/// against rounding, for readers of contact impulses.
 fn keep_impulses(passes: &mut Passes<'_>, h: f32) {
     if !passes.runs(Phase::Solve) {
         return;

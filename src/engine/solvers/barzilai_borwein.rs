@@ -1,13 +1,15 @@
-//! Projected gradients on the convex relaxation of friction, with step lengths from the last change of the gradient:
-//! they follow the curvature of the problem without a bound on it, and the objective need not fall in every step.
+//! Projected gradients on the convex relaxation of friction, with step lengths computed from the last change
+//! of the gradient. These lengths follow the curvature of the problem without a bound on it. The objective
+//! need not fall in every step.
 //!
 //! **Source.** `heyn2013`, section 4.2 (P-SPG-FB), as in Chrono's `ChSolverBB`; `barzilai1988` (step lengths), `birgin2000` (line
 //! search); `anitescu2006` (the relaxation).
 //!
-//! **Departures.** Steps are scaled by each point's effective mass, the same along n and t, so that a cone stays one. The
-//! first step has the length of one of Jacobi's method, not 10⁻⁴ of it. The result is the iterate of least objective, which
-//! bounds the error of velocities; Chrono takes the one of the smallest projected gradient, another projection per iteration. Rows
-//! of joints are in the same vectors, each scaled by its own mass and projected on its bounds.
+//! **Departures.** Steps are scaled by each point's effective mass, the same along n and t, so that a cone
+//! stays a cone. The first step has the length of a Jacobi step, not 10⁻⁴ of it. The result is the iterate
+//! with the smallest objective, which bounds the error of the velocities; Chrono takes the iterate with the
+//! smallest projected gradient, at one more projection per iteration. Joint rows are in the same vectors,
+//! each scaled by its own mass and projected on its bounds.
 //!
 //! **Agreement.** The source at its best: until a residual is reached, 10 values remembered. Here: 20 iterations,
 //! baumgarte 0.3. Apart from the solution in `f64` after 2000 iterations by less than 6e-5 (its method ends at the
@@ -16,12 +18,12 @@
 //! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` times 3 passes over
 //! vectors in lanes, one more for each step that was too long. Sweeps of a step request 11275 B per contact.
 //!
-//! **Fails when** anything slides: the relaxation makes the surfaces part at µ times the speed of sliding. And when
-//! iterations are few for the height of a pile.
+//! **Fails when** anything slides: the relaxation makes the surfaces separate at µ times the sliding speed.
+//! Also when there are few iterations for the height of a pile.
 //!
 //! # The method
 //!
-//! See [`spectral`](crate::engine::constraints::vectors::spectral), with Π the nearest point of the cones.
+//! See [`spectral`](crate::engine::constraints::vectors::spectral); Π gives the nearest point of the cones.
 
 use super::{Law, Variant};
 use crate::engine::clock::Phase;

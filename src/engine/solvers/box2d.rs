@@ -1,10 +1,11 @@
-//! The method of Box2D 3.2: soft contacts in substeps, friction in the relaxing sweeps only.
+//! The method of Box2D 3.2: soft contacts in substeps, with friction only in the relaxing sweeps.
 //!
 //! **Source.** `catto2024box2d` (version 3.2); the rows are those of [`super::soft_step`].
 //!
-//! **Departures.** Bounces are this crate's ([`crate::engine::constraints::impacts::restitution`]), which
-//! keep energy; Box2D gives back e times the speed of approach. Manifolds of bodies that hardly moved are kept as in
-//! Box2D, but a disc's never (`box2d/recycle.rs`). The order is that of this crate's colors.
+//! **Departures.** Restitution is this crate's ([`crate::engine::constraints::impacts::restitution`]), which
+//! conserves energy; Box2D returns e times the approach speed. Manifolds of bodies that hardly moved are kept
+//! as in Box2D, except those of discs (`box2d/recycle.rs`). Contacts are solved in the order of this crate's
+//! colors.
 //!
 //! **Agreement.** The source at its best: 4 substeps of 1 and 1 sweep, 30 Hz, ζ 10, 3 m/s. Here: 4 substeps of 1
 //! iteration, 1 relaxing sweep, contact_hertz 30, push_speed 3, recycle_distance 0.05. Apart from the source's method
@@ -13,8 +14,8 @@
 //! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations` soft sweeps
 //! without friction and `relax_iterations` rigid ones with it. Sweeps of a step request 1638 B per contact.
 //!
-//! **Fails when** [`super::soft_step`] does, and what slides or sticks is less accurate: in a substep
-//! friction sees the normal velocities that the springs left, once.
+//! **Fails when** [`super::soft_step`] does. Sliding and sticking are less accurate: in each substep friction
+//! is solved only once, on top of the normal velocities that the springs left.
 
 mod recycle;
 
@@ -26,7 +27,7 @@ use crate::engine::constraints::{ImpactLaw, Passes, Solver};
 use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, LINEAR_SLOP, Parameter};
 use recycle::Recycled;
 
-/// Place of its distance among the parameters.
+/// Index of `recycle_distance` among the parameters.
 const RECYCLE_DISTANCE: usize = 2;
 
 /// See the [module](self).

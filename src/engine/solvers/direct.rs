@@ -1,16 +1,18 @@
-//! Newton's method on the contact law itself: the impulses of a step are solved exactly instead of iterated.
+//! Newton's method on the contact law itself: the impulses of a step are solved exactly instead of
+//! iteratively.
 //!
-//! **Source.** `alart1991` (the natural map and Newton's method on it), `acary2018` (line search,
-//! proximal outer loop); `cottle1992` (Lemke's method on the law as a linear complementarity problem).
+//! **Source.** `alart1991` (the natural map and Newton's method on it), `acary2018` (line search, proximal
+//! outer loop); `cottle1992` (Lemke's method on the law as a linear complementarity problem).
 //!
-//! **Departures.** Contacts with more supports than a body needs make the linear problem singular. So Newton solves
-//! a proximal problem: ε D (λ − λ₀) is added to the relative velocities, λ₀ being the impulses
-//! that the sweeps left, which makes it definite and keeps what the law leaves open where it was.
-//! Rows of joints are in the same system: a row holds, or has the impulse at its bound. Overlap is pushed apart as in
-//! [`super::pgs`]. Sweeps of [`super::pgs`] come first; a scene of more than `largest` points is left to them, and runs and studies say so.
-//! Each island has its own line search. Where a step of Newton's finds nothing better, eight sweeps in `f64` take its place. After nine
-//! steps that leave more than half of the residual, an island of at most 64 points without joints takes Lemke's answer. With `lemke`
-//! set, that comes first.
+//! **Departures.** A body with more supports than it needs makes the linear problem singular. Newton's method
+//! therefore solves a proximal problem: ε D (λ − λ₀) is added to the relative velocities, where λ₀ are the
+//! impulses left by the sweeps. This makes the problem definite, and impulses that the law does not determine
+//! stay near λ₀. Joint rows are in the same system: a row holds, or has the impulse at its bound. Overlap is
+//! pushed apart as in [`super::pgs`]. Sweeps of [`super::pgs`] come first. A scene with more than `largest`
+//! points is left to them, and runs and studies report that. Each island has its own line search. If a Newton
+//! step finds no improvement, eight sweeps in `f64` replace it. After nine steps that leave more than half of
+//! the residual, an island of at most 64 points without joints tries Lemke's method. With `lemke` set,
+//! Lemke's method comes first.
 //!
 //! **Agreement.** The source at its best: until a residual is reached. Here: 20 iterations, baumgarte 0.3, sweeps
 //! 8, largest 4000, lemke 0. Apart from the solution in `f64` after 2000 iterations by less than 6e-5 (Newton's
@@ -24,12 +26,12 @@
 //! tableau of 16m² entries for m points at each pivot, and there are more pivots than points: it loses to Newton's from the first
 //! point on. Sweeps of a step request 7766 B per contact.
 //!
-//! **Fails when** bands are wide, and where friction lets a point
-//! neither stick nor slip consistently (Painlevé): then states go in circles and the sweeps remain.
+//! **Fails when** bands are wide, and where friction allows a point neither to stick nor to slip consistently
+//! (Painlevé): then the states cycle, and the impulses of the sweeps remain.
 //!
 //! # The method
 //!
-//! Each point is open, sticking or slipping by the sign of what its natural map clips, with ρ = 1/K_ii:
+//! The natural map of a point decides whether it is open, sticking or slipping, with ρ = 1/K_ii:
 //!
 //! ```text
 //! open   λn − ρn un ≤ 0                           λn = λt = 0
@@ -37,8 +39,8 @@
 //! slip   otherwise, s = sign(λt − ρt ut)          un = 0, λt = s µ λn
 //! ```
 //!
-//! In fixed states the law is linear, u = K λ + b. A step goes toward the solution of those states as
-//! far as the residual of the natural map falls.
+//! For fixed states the law is linear, u = K λ + b. A step moves toward the solution of these states, as far
+//! as the residual of the natural map falls.
 
 mod law;
 
@@ -97,19 +99,19 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// ε: shift of the unit diagonal (1).
+/// ε: shift added to the unit diagonal (1).
 const SHIFT: f64 = 1e-7;
-/// Pivots of Lemke's method per unknown before it gives up.
+/// Most pivots of Lemke's method per unknown.
 const PIVOTS: usize = 10;
-/// Solves of a linear problem: one, and two for what it leaves.
+/// Solves of a linear problem: one, and two refinements on the residual.
 const PASSES: usize = 3;
-/// Halvings of a step before Newton gives up.
+/// Most halvings of a Newton step.
 const HALVINGS: usize = 8;
-/// Sweeps in `f64` where a step of Newton's finds nothing better.
+/// Sweeps in `f64` that replace a Newton step without improvement.
 const SWEEPS: usize = 8;
-/// Steps that leave more than half of the merit before Lemke's method is tried.
+/// Steps that leave more than half of the merit, after which Lemke's method is tried.
 const PATIENCE: usize = 9;
-/// Points of an island up to which it is.
+/// Most points of an island for that.
 const PIVOTED: usize = 64;
 /// Residual, relative to the largest impulse, at which the law is solved.
 const TOLERANCE: f64 = 1e-10;
@@ -149,10 +151,10 @@ fn step(passes: &mut Passes<'_>) {
     }
 }
 
-/// Newton's method on its way, island by island.
+/// State of Newton's method, island by island.
 struct Newton {
     islands: Vec<Island>,
-    /// The records' values, and the friction of each point.
+    /// Impulses in the records, and gap and friction of each point.
     written: Vec<Pair>,
     surfaces: Vec<Pair>,
     delta: Vec<Pair>,
@@ -179,7 +181,7 @@ impl Newton {
         Newton { islands, written, surfaces, delta, joints }
     }
 
-    /// One step of every island; records and velocities follow.
+    /// Takes one step in every island, and updates records and velocities.
     fn step(&mut self, system: &mut System<'_>, by_pivots: bool) {
         let mut found = false;
         for island in &mut self.islands {
@@ -200,10 +202,10 @@ impl Newton {
     }
 }
 
-/// Contact points of an island, and its blocks of joints.
+/// Contact points and joint blocks of an island.
 type IslandRows = (Vec<PointRows>, Vec<usize>);
 
-/// Of each island: bodies that can move and that points or joints tie to each other.
+/// Splits the rows into islands: movable bodies that are connected by points or joints.
 fn parts(bodies: &[BodyRow], points: Vec<PointRows>, joints: &JointBlocks) -> Vec<IslandRows> {
     let mut sets = DisjointSets::default();
     sets.begin(bodies.len());
@@ -225,21 +227,21 @@ fn parts(bodies: &[BodyRow], points: Vec<PointRows>, joints: &JointBlocks) -> Ve
     parts.into_values().collect()
 }
 
-/// The impulses of an island and how good they are.
+/// The impulses of an island, and their merit.
 struct Island {
     law: IslandLaw,
-    /// Its blocks of joints.
+    /// Its joint blocks.
     blocks: Vec<usize>,
-    /// Of the bodies' matrix, in its order.
+    /// Factors of the bodies' matrix, in its order.
     factors: BlockLu<3>,
     impulses: Vec<f64>,
     arguments: Vec<f64>,
     merit: f64,
-    /// Nothing better is found any more.
+    /// No improvement was found.
     done: bool,
     /// Steps that left more than half of the merit.
     stalls: usize,
-    /// Lemke's method was tried.
+    /// Whether Lemke's method was tried.
     pivoted: bool,
 }
 
@@ -254,11 +256,11 @@ impl Island {
         Island { law, blocks, factors, impulses, arguments, merit, done: false, stalls: 0, pivoted: false }
     }
 
-    /// Takes these impulses if their merit is at most a `part` of what there is.
+    /// Accepts these impulses if their merit is below `part` times the current merit.
     fn take(&mut self, impulses: Vec<f64>, part: f64) -> bool {
         let arguments = self.law.arguments(&impulses);
         let merit = self.law.merit(&impulses, &arguments);
-        // (Not a number is not better.)
+        // False if the merit is NaN.
         let better = merit < part * self.merit;
         if better {
             (self.impulses, self.arguments, self.merit) = (impulses, arguments, merit);
@@ -266,7 +268,8 @@ impl Island {
         better
     }
 
-    /// One step that lets the residual fall, if there is one: Newton's, or sweeps, or in small islands Lemke's answer.
+    /// One step that reduces the residual, if there is one: Newton's, or sweeps, or Lemke's method in small
+    /// islands. Returns whether it improved.
     fn step(&mut self) -> bool {
         self.done |= self.merit <= self.law.goal(&self.impulses);
         if self.done {
@@ -279,7 +282,7 @@ impl Island {
         found
     }
 
-    /// A step of Newton's, halved until the residual falls.
+    /// A Newton step, halved until the residual falls.
     fn search(&mut self) -> bool {
         let states = self.law.states(&self.arguments);
         let Some(target) = self.law.solve_states(&states, &mut self.factors) else { return false };
@@ -294,14 +297,15 @@ impl Island {
         })
     }
 
-    /// Some more sweeps, if they come nearer: then states are others.
+    /// More sweeps, accepted if they improve the merit: then the states change.
     fn sweep(&mut self) -> bool {
         let mut impulses = self.impulses.clone();
         (0..SWEEPS).for_each(|_| self.law.sweep(&mut impulses));
         self.take(impulses, 1.0)
     }
 
-    /// Lemke's answer, once, if the island has at most so many points and the answer is better than what is there.
+    /// Tries Lemke's method once, if the island has at most `points` points. Accepts its solution if it
+    /// improves the merit.
     fn pivot(&mut self, points: usize) -> bool {
         if std::mem::replace(&mut self.pivoted, true) || self.law.points.len() > points {
             return false;
@@ -309,7 +313,7 @@ impl Island {
         self.law.by_lemke().is_some_and(|found| self.take(found, 1.0))
     }
 
-    /// Makes the impulses those of the records, and velocities follow those of joints.
+    /// Writes the impulses to the records, and updates velocities for those of joints.
     fn write(
         &self,
         system: &mut System<'_>,
@@ -341,7 +345,7 @@ impl Island {
     }
 }
 
-/// Whether an impulse moves this body.
+/// Whether impulses can move this body.
 fn moves(body: &BodyRow) -> bool {
     [body.velocity[3], body.delta[3]] != [0.0; 2]
 }

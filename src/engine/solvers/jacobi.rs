@@ -1,12 +1,12 @@
-//! Jacobi: every contact solves against the velocities from before the sweep, and what all of
-//! them add to a body is summed up. No contact waits for another, so no coloring is needed.
+//! Jacobi: every contact solves against the velocities from before the sweep, and the velocity changes of all
+//! contacts of a body are summed. No contact depends on the result of another, so the method needs no
+//! coloring.
 //!
 //! **Source.** `catto2024solver2d`, `solve_jacobi`; soft contacts as in [`super::soft_step`].
 //!
-//! **Departures.** Contacts between two dynamic bodies are softer than those with others by a
-//! factor of two in frequency, as in the source; sums are formed color by color, so that
-//! every width gives the same bits. A factor `relaxation` on all increments is added: 1 is the
-//! source's solver.
+//! **Departures.** Contacts between two dynamic bodies have half the frequency of contacts with other bodies,
+//! as in the source. Sums are formed color by color, so that every width gives the same bits. A factor
+//! `relaxation` on all increments is added; 1 is the source's solver.
 //!
 //! **Agreement.** The source at its best: 4 soft sweeps and 2 relaxing ones, 30 Hz, ζ 10, 4 m/s. Here: 4 iterations,
 //! 2 relaxing sweeps, contact_hertz 30, relaxation 1, push_speed 4. Apart from the source's method in `f64` over 10
@@ -17,9 +17,10 @@
 //! the positions, `relax_iterations` rigid ones. A sweep gathers each body twice, as it reads old
 //! velocities and adds to sums. Sweeps of a step request 1957 B per contact.
 //!
-//! **Fails when** a body has several contacts: each removes the whole approach velocity, and n of them remove it n
-//! times. The iteration x ← x − D⁻¹(A x + b) diverges where D⁻¹A has an eigenvalue above 2, which a body in a pile
-//! has from three contacts on. A `relaxation` below 2/λ_max cures that and slows everything else.
+//! **Fails when** a body has several contacts: each removes the whole approach velocity, so n of them remove
+//! it n times. The iteration x ← x − D⁻¹(A x + b) diverges if D⁻¹A has an eigenvalue above 2, which happens
+//! for a body in a pile with three contacts or more. A `relaxation` below 2/λ_max prevents that, but slows
+//! down everything else.
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;

@@ -1,13 +1,15 @@
-//! Jolt's schedule: sequential impulses with one friction row a contact, solved before its normal rows; overlap is
-//! removed by position sweeps.
+//! Jolt's schedule: sequential impulses with one friction row per contact, solved before its normal rows.
+//! Overlap is removed by position sweeps.
 //!
-//! **Source.** `rouwe2026jolt`: `PhysicsSettings.h` (10 velocity iterations, 2 position iterations, Baumgarte 0.2, slop 2 cm, look
-//! ahead 2 cm, rebounds from 1 m/s on), `ContactConstraintManager.cpp` (rows and their order).
+//! **Source.** `rouwe2026jolt`: `PhysicsSettings.h` (10 velocity iterations, 2 position iterations, Baumgarte
+//! 0.2, slop 2 cm, look-ahead 2 cm, rebounds above 1 m/s), `ContactConstraintManager.cpp` (rows and their
+//! order).
 //!
-//! **Departures.** Impulses follow feature ids from step to step; the source looks for a point within 1 cm. Friction is kept in
-//! equal parts on the points of a contact, so that a warm start of points that come or go moves its arm. Contacts and joints are swept in
-//! the order of this crate, color by color; the source sweeps all joints first. Manifolds of bodies that hardly move are found
-//! again; the source reuses them. Sleeping is left out.
+//! **Departures.** Impulses are matched by feature id from step to step; the source looks for a point within
+//! 1 cm. Friction is stored in equal parts on the points of a contact, so its arm in the warm start moves
+//! when points appear or disappear. Contacts and joints are swept in the order of this crate, color by color;
+//! the source sweeps all joints first. Manifolds of bodies that hardly move are recomputed; the source reuses
+//! them. Sleeping is left out.
 //!
 //! **Agreement.** The source at its best: 10 velocity and 2 position iterations. Here: 10 iterations, 2 position sweeps,
 //! correction 0.2, slop 0.02. Apart from the source's method in `f64` over 10 iterations by less than 6e-5:
@@ -16,13 +18,13 @@
 //! **Cost.** Per step 2 body passes, 1 warm start, `velocity_iterations` velocity sweeps and `position_iterations` position
 //! sweeps. Sweeps of a step request 2459 B per contact.
 //!
-//! **Fails when** stacks are tall or heavy on light: ten sweeps carry a load up ten contacts. A slop of 2 cm is visible in small
-//! scenes.
+//! **Fails when** stacks are tall, or heavy bodies rest on light ones: ten sweeps carry a load up ten
+//! contacts. A slop of 2 cm is visible in small scenes.
 //!
 //! # The friction row
 //!
-//! It acts at the mean of the points, r, and its cone is that of all of them, with the normal impulses of the iteration
-//! before:
+//! The row acts at the mean of the points, r. Its bound is the sum over all points, with the normal impulses
+//! of the previous iteration:
 //!
 //! ```text
 //! 1/m = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (r_a × t)² + I_b⁻¹ (r_b × t)²,   λ ← clamp(λ − m v_t, ±µ Σ λn)
@@ -65,7 +67,7 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// Overlap that counts in a position sweep, at most (m).
+/// Largest overlap that a position sweep takes into account (m).
 const DEEPEST: f32 = 0.2;
 
 fn step(passes: &mut Passes<'_>) {

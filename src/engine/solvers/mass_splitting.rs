@@ -1,14 +1,13 @@
-//! Jacobi on split bodies: a body with n contacts becomes n copies of an n-th of its mass, each contact
-//! has its own two copies, and after a sweep the copies of a body are brought together at their
-//! mean velocity.
+//! Jacobi on split bodies: a body with n contacts becomes n copies with an n-th of its mass each. Every
+//! contact has its own copies of its two bodies. After a sweep, all copies of a body get their mean velocity.
 //!
-//! Copies share nothing, so that all contacts can be solved at once; and the mean of velocities
-//! that are each right cannot overshoot as the sum of [`super::jacobi`] does.
+//! Contacts share no copies, so all of them can be solved at once. Each copy has a correct velocity, and the
+//! mean of those cannot overshoot as the sum of [`super::jacobi`] does.
 //!
 //! **Source.** `tonge2012`, sections 4 and 5.
 //!
-//! **Departures.** Within a contact rows are solved one after the other. Overlap is pushed apart by the
-//! soft rows of [`super::soft_step`], which the source does not have.
+//! **Departures.** The rows of a contact are solved one after the other. Overlap is pushed apart by the soft
+//! rows of [`super::soft_step`], which the source does not have.
 //!
 //! **Agreement.** The source at its best: rigid, until a residual is reached. Here: 8 iterations, 4 relaxing sweeps,
 //! contact_hertz 30, push_speed 3. Apart from the source's method in `f64` over 10 iterations by less than 6e-5:
@@ -19,14 +18,15 @@
 //! soft sweeps and `relax_iterations` rigid ones, each of which gathers bodies twice as
 //! [`super::jacobi`] does. Sweeps of a step request 4389 B per contact.
 //!
-//! **Fails when** sweeps are few: it always converges, but slowly, since each contact sees the n-th part of a mass.
+//! **Fails when** sweeps are few. The method always converges, but slowly, because each contact acts on only
+//! an n-th of a mass.
 //!
 //! # Why it converges
 //!
-//! With J split by contacts, the sweep minimizes the sum of all contacts' energies over copies that
-//! were equal before it; the mean is the projection on equal copies in the norm of their masses,
-//! n (m/n) = m. Neither raises the energy ½ λᵀ K λ + bᵀ λ. Momentum is kept: copies get Δλ/(m/n) each,
-//! a body the mean, Σ Δλ/m.
+//! With J split by contacts, the sweep minimizes the sum of the energies of all contacts over the copies,
+//! which were equal before it. The mean is the projection onto equal copies in the norm of their masses, n
+//! (m/n) = m. Neither raises the energy ½ λᵀ K λ + bᵀ λ. Momentum is conserved: copies get Δλ/(m/n) each, and
+//! the body gets the mean, Σ Δλ/m.
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
@@ -97,7 +97,7 @@ impl Solver for MassSplitting {
 }
 
 impl MassSplitting {
-    /// Sweeps on split bodies.
+    /// Runs `times` sweeps on split bodies.
     fn sweeps(&mut self, passes: &mut Passes<'_>, phase: Phase, rule: Soft, times: u32) {
         let MassSplitting { graph, masses, sums } = self;
         passes.scale_masses(phase, masses, |body| graph.constraints_of(body).max(1) as f32);

@@ -109,10 +109,10 @@ pub static VARIANTS: [&Variant; 35] = [
     &two_level::SOLVER,
 ];
 
-/// The solver that is used where none is named.
+/// Solver used if none is named.
 pub const DEFAULT: &str = "shim";
 
-/// Which fields of a [`Budget`] a solver's schedule has.
+/// The fields of a [`Budget`] that a solver's schedule uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Uses {
@@ -124,10 +124,10 @@ pub struct Uses {
     pub position: bool,
 }
 
-/// A property that tests check for every solver, unless its row says that it does not have it.
+/// A property that tests check for every solver, unless its row declares an exception.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Law {
-    /// Lane widths give the same bits.
+    /// All lane widths give the same bits.
     SameBits,
     /// Impulses act on two bodies with opposite signs.
     Momentum,
@@ -137,13 +137,13 @@ pub enum Law {
     NoAllocation,
     /// More iterations on one problem converge to the solver's own law.
     Converges,
-    /// Piles of a few boxes stay where they are at the standard budget.
+    /// Piles of a few boxes stay at rest at the standard budget.
     Rest,
 }
 
 /// A row of [`VARIANTS`].
 ///
-/// A solver from outside needs no row in the table to run:
+/// A solver defined outside the crate needs no row in the table to run:
 ///
 /// ```
 /// # use simpulse_engine as simpulse;
@@ -187,21 +187,21 @@ pub struct Variant {
     pub iterations: fn(standard: Budget, k: u32) -> Budget,
     /// Its own parameters, [`MAX_PARAMETERS`] at most.
     pub parameters: &'static [Parameter],
-    /// Its mechanisms that a run can leave out, see [`Variant::mechanism`]; 32 at most.
+    /// Mechanisms that a run can switch off, see [`Variant::mechanism`]; 32 at most.
     pub mechanisms: &'static [Mechanism],
-    /// Angular frequencies (rad/s) of its soft contacts, between dynamic bodies and with
-    /// others, from its parameters and the substep (s); none if its contacts are not springs. At rest
-    /// such a contact gives way, and metrics tell that from error.
+    /// Angular frequencies (rad/s) of its soft contacts, between dynamic bodies and with other bodies, from
+    /// its parameters and the substep (s); `None` if its contacts are not springs. A soft contact deflects
+    /// under load even at rest, and metrics do not count that deflection as an error.
     pub softness: Option<fn(&Parameters, f32) -> [f32; 2]>,
     /// Impact law of its source.
     pub impacts: ImpactLaw,
     /// Default of [continuous collision](crate::engine::continuous).
     pub continuous: bool,
-    /// Numbers that it keeps from step to step, in addition to impulses.
+    /// Numbers kept from step to step, in addition to impulses.
     pub kept: KeptSize,
-    /// Why it holds no joints, if it does not.
+    /// Why it does not support joints, if it does not.
     pub holds_no_joints: Option<&'static str>,
-    /// Properties that it does not have, and why.
+    /// Properties that it does not have, with the reason.
     pub breaks: &'static [(Law, &'static str)],
     /// Creates the solver of a world: its schedule and its state.
     pub make: fn() -> Box<dyn Solver>,
@@ -234,18 +234,19 @@ impl Variant {
         make: || Schedule::boxed(|_| {}),
     };
 
-    /// For [`Self::make`] of the solvers here. Statics are built whether something uses them or not, with all that they name: unit tests,
-    /// which make no solver, took two minutes more to build.
+    /// Wraps [`Self::make`] of the solvers of this crate. A static is compiled together with everything that
+    /// it refers to, used or not. Unit tests create no solver, and without this they took two minutes longer
+    /// to build.
     pub(crate) const fn made_by(make: fn() -> Box<dyn Solver>) -> fn() -> Box<dyn Solver> {
         if cfg!(test) { || unreachable!("unit tests make no solver") } else { make }
     }
 
-    /// The budget of `k` of what the solver itself calls iterations, without substeps.
+    /// The budget of `k` iterations as the solver counts them, without substeps.
     pub fn of_iterations(&self, k: u32) -> Budget {
         (self.iterations)(self.budget, k)
     }
 
-    /// Its parameters' standard values.
+    /// Default values of its parameters.
     pub fn defaults(&self) -> Parameters {
         let mut values = [0.0; MAX_PARAMETERS];
         for (value, parameter) in values.iter_mut().zip(self.parameters) {
@@ -254,7 +255,7 @@ impl Variant {
         values
     }
 
-    /// Place of the parameter called `name`; hyphens count as underscores. Errors: no such parameter.
+    /// Index of the parameter called `name`; hyphens count as underscores. Errors: no such parameter.
     pub fn parameter(&self, name: &str) -> Result<usize, Error> {
         let plain = name.replace('-', "_");
         self.parameters.iter().position(|p| p.name == plain).ok_or_else(|| Error::Unknown {
@@ -264,7 +265,7 @@ impl Variant {
         })
     }
 
-    /// Sets the parameter called `name`. Errors: no such parameter, a value out of its range.
+    /// Sets the parameter called `name`. Errors: no such parameter, or a value out of its range.
     pub fn set(&self, values: &mut Parameters, name: &str, value: f32) -> Result<(), Error> {
         let place = self.parameter(name)?;
         let Parameter { name, unit, range: [least, greatest], .. } = self.parameters[place];
@@ -276,8 +277,8 @@ impl Variant {
         Ok(())
     }
 
-    /// Place of the mechanism called `name`, for [`crate::engine::params::Without`]; hyphens count as underscores. Errors: no such
-    /// mechanism.
+    /// Index of the mechanism called `name`, for [`crate::engine::params::Without`]; hyphens count as
+    /// underscores. Errors: no such mechanism.
     pub fn mechanism(&self, name: &str) -> Result<usize, Error> {
         let plain = name.replace('-', "_");
         self.mechanisms.iter().position(|m| m.name == plain).ok_or_else(|| Error::Unknown {
@@ -293,7 +294,7 @@ impl Variant {
     }
 }
 
-/// Prepares and solves one step; returns what was done.
+/// Prepares and solves one step; returns the work done.
 pub fn run(
     solver: &mut dyn Solver,
     work: &mut Workspace,

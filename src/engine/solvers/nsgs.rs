@@ -1,10 +1,11 @@
-//! Block Gauss–Seidel: the normal and the friction row of a contact point are solved together, exactly.
+//! Block Gauss–Seidel: the normal row and the friction row of a contact point are solved together, exactly.
 //!
-//! **Source.** `acary2018` (NSGS with an exact local solver; in the plane the cone of a point has two edges, and the
-//! local problem a closed form).
+//! **Source.** `acary2018` (NSGS with an exact local solver). In 2D the cone of a point has two edges, and
+//! the local problem has a closed form.
 //!
-//! **Departures.** Bias, slop, speculative contacts and warm starts are those of [`super::pgs`], so that the two differ in
-//! the local problem alone. The source stops by a residual; here sweeps are counted.
+//! **Departures.** Bias, slop, speculative contacts and warm starts are those of [`super::pgs`], so that the
+//! two solvers differ only in the local problem. The source stops at a residual; here the number of sweeps is
+//! fixed.
 //!
 //! **Agreement.** The source at its best: local solver exact, until a residual is reached. Here: 8 iterations,
 //! baumgarte 0.3. Apart from the source's method in `f64` over 10 iterations by less than 6e-5:
@@ -13,29 +14,30 @@
 //! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` sweeps. Sweeps of a step request
 //! 1750 B per contact.
 //!
-//! **Fails when** [`super::pgs`] does: one point is exact, the next one is not.
+//! **Fails when** [`super::pgs`] does: one point is exact, its neighbor is not.
 //!
 //! # The local problem
 //!
-//! With all other points fixed, the normal impulse x and the friction impulse y of a point follow the lines that their
-//! rows have (`x = max(0, c − s v_n)`, `y = y⁰ − m v_t` within the cone), and each feels the other through
-//! k = I_a⁻¹ A_an A_at + I_b⁻¹ A_bn A_bt. With g = s k, f = m k and the right sides r = c − s v_n + g y⁰,
-//! q = y⁰ − m v_t + f x⁰,
+//! With all other points fixed, the normal impulse x and the friction impulse y of a point follow the lines
+//! of their rows (`x = max(0, c − s v_n)`, `y = y⁰ − m v_t` within the cone). They are coupled by k = I_a⁻¹
+//! A_an A_at + I_b⁻¹ A_bn A_bt. With g = s k, f = m k and the right-hand sides r = c − s v_n + g y⁰, q = y⁰ −
+//! m v_t + f x⁰,
 //!
 //! ```text
 //! x = max(0, r − g y),   y = the point nearest to q − f x in [−µ x, µ x]
 //! ```
 //!
-//! As long as it touches, x(y) = r − g y, and q − f x(y) − y = (q − f r) − (1 − f g) y falls with y, because
-//! f g = s m k² < 1 (k² is less than the product of both diagonals, and s, m at most their inverses). So the friction that sticks,
-//! y = (q − f r)/(1 − f g), is cut where the line x(y) leaves the cone:
+//! While the point touches, x(y) = r − g y. Then q − f x(y) − y = (q − f r) − (1 − f g) y falls with y,
+//! because f g = s m k² < 1 (k² is less than the product of the two diagonal entries, and s and m are at most
+//! their inverses). The sticking friction, y = (q − f r)/(1 − f g), is therefore clamped to where the line
+//! x(y) leaves the cone:
 //!
 //! ```text
 //! −µ r/(1 − µ g) ≤ y ≤ µ r/(1 + µ g),   x = r − g y
 //! ```
 //!
-//! An edge whose denominator is not positive is never reached: there x grows faster than the bound needs (the case of
-//! Painlevé's rod). Where r ≤ 0 nothing touches and both are zero.
+//! An edge with a non-positive denominator is never reached: there the bound µ x grows at least as fast as
+//! |y| (the case of Painlevé's rod). If r ≤ 0 the point does not touch, and both impulses are zero.
 
 use super::{Law, Variant};
 use crate::engine::clock::Phase;
@@ -80,7 +82,7 @@ fn step(passes: &mut Passes<'_>) {
     }
 }
 
-/// The sweep of this solver under a rule of normal rows.
+/// The sweep of this solver, for a given rule of normal rows.
 #[derive(Clone, Copy, Debug)]
 struct ConeSweep<R>(R);
 
@@ -114,7 +116,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
     in_stages::<L, N, O, _, _>(rows, batches, segment, PointByPoint(rule));
 }
 
-/// The sweep as a kernel: each point exactly, one after the other.
+/// The sweep as a kernel: points one after the other, each exactly.
 #[derive(Clone, Copy)]
 struct PointByPoint<R>(R);
 
@@ -192,22 +194,22 @@ impl<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule> Stages<L, N, O> fo
     }
 }
 
-/// The impulses x and y of a point, see the [module](self), from µ, `[g, f]`, what both would be alone and unbounded,
-/// and what they are.
+/// The impulses x and y of a point, see the [module](self). Inputs: µ, `[g, f]`, the impulse that each row
+/// alone would take without bounds, and the current impulses.
 #[inline(always)]
 fn point<L: Lanes>(friction: L, [g, f]: [L; 2], alone: [L; 2], old: [L; 2]) -> [L; 2] {
     let one = L::splat(1.0);
     let r = g.mul_add(old[1], alone[0]);
     let q = f.mul_add(old[0], alone[1]);
     let reach = friction * r.max(L::zero());
-    // Beyond the largest number where the edge is never reached; nothing where nothing touches.
+    // The largest float if the edge is never reached; zero if the point does not touch.
     let never = r.select_positive(L::splat(f32::MAX), L::zero());
     let edge = |denominator: L| denominator.select_positive(reach / denominator, never);
     let (low, high) = (edge(friction.neg_mul_add(g, one)), edge(friction.mul_add(g, one)));
     let sticking = f.neg_mul_add(r, q) / f.neg_mul_add(g, one);
     let y = sticking.min(high).max(-low);
     let x = g.neg_mul_add(y, r).max(L::zero());
-    // What rounding leaves outside of the cone.
+    // Rounding may leave y slightly outside the cone.
     let bound = friction * x;
     [x, y.min(bound).max(-bound)]
 }
@@ -217,7 +219,7 @@ mod tests {
     use super::*;
 
     proptest::proptest! {
-        /// Both laws of the point hold to what rounding does to their terms, from any impulses before.
+        /// Both laws of the point hold, up to rounding of their terms, for any previous impulses.
         #[test]
         fn a_point_is_solved_exactly(
             friction in 0.0f32..2.0,
@@ -237,7 +239,7 @@ mod tests {
             let rounding = 3e-5 * (1.0 + x.abs() + y.abs()) / (1.0 - cosine * cosine);
             proptest::prop_assert!(x >= 0.0 && w[0] >= -rounding && x.min(w[0]) <= rounding, "{x} {y} {w:?}");
             proptest::prop_assert!(y.abs() <= friction * x * 1.000_001, "{x} {y}");
-            // What slides, slides against its friction, which is all of the cone.
+            // A sliding point slides against its friction, which is at the edge of the cone.
             let left = friction * x - y.abs();
             proptest::prop_assert!(left.min(w[1].abs()) <= rounding, "{x} {y} {w:?}");
             proptest::prop_assert!(w[1].abs() <= rounding || y * w[1] <= rounding, "{x} {y} {w:?}");

@@ -1,14 +1,12 @@
-//! Sequential impulses: Gauss–Seidel on velocities, one contact row after the other.
-//! Each row applies the impulse that makes its own velocity right; sweeping over all
-//! rows again and again makes all of them right.
+//! Sequential impulses: Gauss–Seidel on velocities, one contact row after the other. Each row applies the
+//! impulse that corrects its own velocity. Repeated sweeps over all rows correct all of them.
 //!
-//! **Source.** `catto2005` (projected Gauss–Seidel on J M⁻¹ Jᵀ λ = b, warm starting),
-//! `catto2006` (impulses applied at once, accumulated clamping), `baumgarte1972`, and
-//! `article`, whose factor 0.3 this uses.
+//! **Source.** `catto2005` (projected Gauss–Seidel on J M⁻¹ Jᵀ λ = b, warm starting), `catto2006` (impulses
+//! applied at once, accumulated clamping), `baumgarte1972`, and `article`, whose factor 0.3 is used here.
 //!
-//! **Departures.** A slop is left uncorrected, so that resting contacts stay contacts;
-//! points that do not touch yet may close their gap but no more (speculative contacts);
-//! the push is capped. The article has none of the three.
+//! **Departures.** A slop is left uncorrected, so that resting contacts stay contacts. Separated points may
+//! close their gap, but not penetrate (speculative contacts). The push is capped. The article has none of the
+//! three.
 //!
 //! **Agreement.** The source at its best: 10 sweeps, β 0.2, slop 10 mm, warm start (box2d-lite). Here: 8 iterations,
 //! baumgarte 0.3. Apart from the source's method in `f64` over 10 iterations by less than 6e-5:
@@ -19,24 +17,23 @@
 //! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` sweeps. Sweeps of a step request
 //! 1750 B per contact.
 //!
-//! **Fails when** a heavy body rests on a light one (the error shrinks by R/(1+R) per
-//! sweep for the mass ratio R) and in tall stacks (by cos²(π/2N) for N bodies): overlap
-//! grows faster than the few sweeps of a frame remove it. Baumgarte's push also adds
-//! energy when deep overlap resolves.
+//! **Fails when** a heavy body rests on a light one (the error shrinks by R/(1+R) per sweep for the mass
+//! ratio R), and in tall stacks (by cos²(π/2N) per sweep for N bodies): overlap grows faster than the few
+//! sweeps of a frame remove it. Baumgarte's push also adds energy when deep overlap is resolved.
 //!
 //! # The method
 //!
-//! A contact row with Jacobian J requires J v + b ≥ 0, λ ≥ 0, and one of the two zero. With
-//! every other impulse fixed, λ alone changes its velocity by k = J M⁻¹ Jᵀ, so the
-//! impulse that gives J v + b = 0 is Δλ = −(J v + b)/k. What must not become negative
-//! is the *accumulated* impulse, not the increment:
+//! A contact row with Jacobian J requires J v + b ≥ 0 and λ ≥ 0, and one of the two must be zero. With all
+//! other impulses fixed, λ changes the velocity of its row by k = J M⁻¹ Jᵀ per unit, so the impulse that
+//! gives J v + b = 0 is Δλ = −(J v + b)/k. The *accumulated* impulse must not become negative; the increment
+//! may:
 //!
 //! ```text
 //! λ ← max(0, λ − (J v + b)/k)
 //! ```
 //!
-//! so that a later row's push can be taken back. Friction clamps its own accumulated
-//! impulse to ±µλ. The accumulated impulses are kept, and the next step starts from them.
+//! A push can therefore be taken back in a later sweep. Friction clamps its own accumulated impulse to ±µλ.
+//! The accumulated impulses are kept, and the next step starts from them.
 
 use super::{Law, Variant};
 use crate::engine::clock::Phase;

@@ -1,11 +1,11 @@
-//! Sequential impulses on rigid velocities, then nonlinear Gauss–Seidel on positions: overlap is
-//! never turned into velocity.
+//! Sequential impulses on rigid velocities, then nonlinear Gauss–Seidel on positions: overlap is never turned
+//! into velocity.
 //!
 //! **Source.** `catto2024solver2d`, `solve_pgs_ngs`.
 //!
-//! **Departures.** Gaps are closed and no more (speculative contacts), which the source's rigid rows do
-//! not know. A joint is corrected by 0.2 m at most in a sweep, as a contact is. Normal rows come before friction rows, as in [`super::pgs`]; the source has them the
-//! other way round.
+//! **Departures.** Points with a gap may close it, but not penetrate (speculative contacts); the source's
+//! rigid rows have no such term. A position sweep corrects a joint by at most 0.2 m, as it does a contact.
+//! Normal rows come before friction rows, as in [`super::pgs`]; in the source they come after them.
 //!
 //! **Agreement.** The source at its best: 4 sweeps and 2 position sweeps, correction 0.2, slop 5 mm. Here: 4
 //! iterations, 2 position sweeps, correction 0.2. Apart from the source's method in `f64` over 10 iterations by less
@@ -15,8 +15,8 @@
 //! **Cost.** Per substep 2 body passes, 1 warm start, `velocity_iterations` velocity sweeps and
 //! `position_iterations` position sweeps. Sweeps of a step request 1263 B per contact.
 //!
-//! **Fails when** the sweeps are too few for the height of a stack, as those of [`super::pgs`]: what
-//! they leave over is kept as velocity, and two position sweeps take little of it back.
+//! **Fails when** there are too few sweeps for the height of a stack, as with [`super::pgs`]. The residual of
+//! the sweeps stays in the velocities, and two position sweeps correct little of the resulting overlap.
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;

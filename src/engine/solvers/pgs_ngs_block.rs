@@ -1,11 +1,11 @@
-//! Sequential impulses in which the two normal rows of a contact are solved together, and
-//! overlap is removed from positions.
+//! Sequential impulses in which the two normal rows of a contact are solved together. Overlap is removed from
+//! positions.
 //!
-//! **Source.** `catto2024solver2d`, `solve_pgs_ngs_block`; `catto2006` (the 2 × 2 problem by
-//! enumeration of its four cases).
+//! **Source.** `catto2024solver2d`, `solve_pgs_ngs_block`; `catto2006` (the 2 × 2 problem, solved by
+//! enumerating its four cases).
 //!
-//! **Departures.** Gaps are closed and no more (speculative contacts), which the source's rigid
-//! rows do not know. Position sweeps go point by point; the source solves them in pairs, too.
+//! **Departures.** Points with a gap may close it, but not penetrate (speculative contacts); the source's
+//! rigid rows have no such term. Position sweeps solve point by point; the source also solves those in pairs.
 //!
 //! **Agreement.** The source at its best: 4 sweeps and 2 position sweeps, correction 0.2, slop 5 mm. Here: 4
 //! iterations, 2 position sweeps, correction 0.2. Apart from the source's method in `f64` over 10 iterations by less
@@ -15,7 +15,7 @@
 //! **Cost.** Per substep 2 body passes, 1 warm start, `velocity_iterations` block sweeps and
 //! `position_iterations` position sweeps. Sweeps of a step request 1263 B per contact.
 //!
-//! **Fails when** loads must travel far: the block couples two points, not two contacts, so
+//! **Fails when** loads must travel far: the block couples the two points of a contact, not two contacts, so
 //! convergence over a stack is that of [`super::pgs`].
 
 use super::{Law, Uses, Variant};

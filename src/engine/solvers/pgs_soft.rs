@@ -1,4 +1,5 @@
-//! Sequential impulses on soft contacts, and sweeps without the springs after the positions.
+//! Sequential impulses on soft contacts; after the positions are integrated, relaxing sweeps without the
+//! springs.
 //!
 //! **Source.** `catto2024solver2d`, `solve_pgs_soft`; the rows are those of [`super::soft_step`].
 //!
@@ -13,8 +14,8 @@
 //! **Cost.** Per substep 2 body passes, 1 warm start, `velocity_iterations` soft sweeps and, after
 //! the positions, `relax_iterations` rigid ones. Sweeps of a step request 1351 B per contact.
 //!
-//! **Fails when** stacks are tall: the sweeps of one step do not carry a load through them, and at
-//! a third of the step rate a spring is as soft as 20 Hz.
+//! **Fails when** stacks are tall: the sweeps of one step do not carry a load through them. At a third of the
+//! step rate, a spring is only as stiff as 20 Hz.
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;

@@ -1,12 +1,13 @@
-//! Rigid sequential impulses in substeps: the rows of [`super::pgs`], swept once or twice in each of many short substeps.
+//! Rigid sequential impulses in substeps: the rows of [`super::pgs`], swept once or twice in each of many
+//! short substeps.
 //!
 //! [`super::tgs_soft`] and its relatives add springs and relaxing sweeps, so this solver shows how much of their
 //! quality comes from substeps alone.
 //!
 //! **Source.** `macklin2019` (small steps instead of iterations); the rows of `catto2006`.
 //!
-//! **Departures.** The source displaces positions (that is [`super::xpbd`]); here velocities are solved, with a warm start in
-//! every substep, the first one over contacts and the others over bodies.
+//! **Departures.** The source displaces positions, as [`super::xpbd`] does. Here velocities are solved, with
+//! a warm start in every substep: the first is a pass over contacts, the others are passes over bodies.
 //!
 //! **Agreement.** The source at its best: many substeps of 1 iteration. Here: 8 substeps of 2 iterations, baumgarte
 //! 0.3. Apart from the source's method in `f64` over 10 substeps by less than 6e-5:
@@ -16,9 +17,9 @@
 //! **Cost.** Per step 1 warm start; per substep 2 body passes and `velocity_iterations` sweeps. Sweeps of a step
 //! request 3370 B per contact.
 //!
-//! **Fails when** one sweep per substep is all there is: what a sweep leaves over is applied once more by the warm
-//! start of the next substep, and grows in pyramids (`papers/solver2d.md`); two sweeps damp it. Baumgarte's push adds
-//! energy as in [`super::pgs`].
+//! **Fails when** there is only one sweep per substep. The residual of that sweep is applied again by the
+//! warm start of the next substep, and grows in pyramids (`papers/solver2d.md`); a second sweep damps it.
+//! Baumgarte's push adds energy, as in [`super::pgs`].
 
 use super::Variant;
 use crate::engine::clock::Phase;

@@ -1,16 +1,18 @@
-//! PhysX's TGS: substeps of one biased sweep each, over impulses that add up from zero in every step; friction belongs to
-//! the contact and holds the places where it began to stick.
+//! PhysX's TGS: substeps with one biased sweep each, in which impulses accumulate from zero in every step.
+//! Friction acts per contact and holds its points where they began to stick.
 //!
-//! **Source.** `nvidia2026physx`: `DyTGSDynamics.cpp` (schedule, bias 2/√n), `DyTGSContactPrep.cpp` (rows), at their
-//! defaults: 4 position iterations, which are the substeps, 1 velocity iteration, no limit on depenetration, strong friction, friction within
-//! 4 cm; forces act in every substep, which the source does where
-//! `eENABLE_EXTERNAL_FORCES_EVERY_ITERATION_TGS` is set.
+//! **Source.** `nvidia2026physx`: `DyTGSDynamics.cpp` (schedule, bias 2/√n), `DyTGSContactPrep.cpp` (rows),
+//! with their defaults: 4 position iterations, which are the substeps, 1 velocity iteration, no limit on
+//! depenetration, strong friction, friction within 4 cm. Forces act in every substep, which the source does
+//! if `eENABLE_EXTERNAL_FORCES_EVERY_ITERATION_TGS` is set.
 //!
-//! **Departures.** By default the source adds the forces of the whole step before the first substep: columns then never come to rest, and
-//! what falls is up to half a step ahead (`papers/contest.md`). A patch is a contact: its anchors are its points as they are matched from step to
-//! step, where the source grows two anchors in a patch and keeps them while it lasts. What is to bounce in the step leaves from where it is. Impulses of
-//! joints, whose rows are those of this crate, begin anew in each substep. Contacts are swept color by color, in the source by islands and
-//! partitions. Sleeping, stabilization, compliant and torsional contacts are left out.
+//! **Departures.** By default the source adds the forces of the whole step before the first substep: columns
+//! then never come to rest, and falling bodies are up to half a step ahead (`papers/contest.md`). A patch is
+//! a contact: its anchors are its points, matched from step to step. The source grows two anchors in a patch
+//! and keeps them while the patch lasts. A point that would hit within the step rebounds at once, from where
+//! it is. Impulses of joints restart from zero in each substep, and joints have the rows of this crate.
+//! Contacts are swept color by color; the source sweeps by islands and partitions. Sleeping, stabilization,
+//! compliant and torsional contacts are left out.
 //!
 //! **Agreement.** The source at its best: 4 substeps, 1 velocity iteration at the end. Here: 4 substeps of 1 iteration, 1 relaxing
 //! sweep, baumgarte 0.8, push_speed 1000. Apart from the source's method in `f64` over 10 substeps by less than 6e-5:
@@ -21,7 +23,7 @@
 //! end; per step 1 pass that brings drifts into the order of the lanes and 1 that books them. No warm start. Sweeps of a step request 1077 B per
 //! contact.
 //!
-//! **Fails when** stacks are tall: impulses begin at zero in each step.
+//! **Fails when** stacks are tall: impulses start from zero in each step.
 //!
 //! # The rows
 //!
@@ -30,7 +32,8 @@
 //! friction  λ ← clamp(λ − β m (v + d β/h), ±µ Σ λn/points)
 //! ```
 //!
-//! s is the separation now, below zero left alone in velocity iterations, and d the way from the anchor.
+//! s is the current separation (overlap counts as zero in velocity iterations), and d the distance from the
+//! anchor.
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
@@ -71,7 +74,7 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// Points that are farther apart (m) have no anchors: `frictionOffsetThreshold`.
+/// Points with a larger separation (m) have no anchors: `frictionOffsetThreshold`.
 const REACH: f32 = 0.04;
 
 /// State from step to step.
@@ -114,9 +117,9 @@ impl Solver for PhysX {
                 }
             }
         }
-        // What bounces is known since the step began.
+        // Bounces were found at the start of the step.
         passes.bounce(budget.substeps - 1);
-        // Impulses add up over the whole step, as nothing is applied twice.
+        // Impulses accumulate over the whole step, because none is applied twice.
         passes.book_impulses();
         self.drifts.book(passes, reach);
     }

@@ -1,11 +1,11 @@
-//! Projection: move overlapping bodies apart, then remove the velocity with which they
-//! approach. This is the founding article's ground constraint
-//! (`pos += penetration; velocity = 0`), extended to contacts between bodies.
+//! Projection: push overlapping bodies apart, then remove the velocity at which they approach. This is the
+//! ground constraint of the founding article (`pos += penetration; velocity = 0`), extended to contacts
+//! between bodies.
 //!
 //! **Source.** `article`, section "Constraints".
 //!
-//! **Departures.** The push is shared between two bodies by their masses and inertias,
-//! λ = −s/k; the velocity is only projected along the normal and only while approaching.
+//! **Departures.** The push is shared between the two bodies according to their masses and inertias, λ =
+//! −s/k. Velocities are projected only along the normal, and only while the bodies approach.
 //!
 //! **Agreement.** The source at its best: one push and one projection, bodies against the ground. Here: 4 iterations,
 //! 4 position sweeps. Apart from the source's method in `f64` over 10 iterations by less than 6e-5:
@@ -14,8 +14,8 @@
 //! **Cost.** Per substep 2 body passes, `position_iterations` position sweeps and
 //! `velocity_iterations` velocity sweeps. Sweeps of a step request 1306 B per contact.
 //!
-//! **Fails when** anything should slide, roll or lean: there is no friction. There is no
-//! warm starting either, so every step starts cold and tall stacks sink and spread.
+//! **Fails when** anything should slide, roll or lean: there is no friction. Without warm starting, every
+//! step starts from zero impulses, so tall stacks sink and spread.
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;

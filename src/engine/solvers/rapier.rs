@@ -1,14 +1,14 @@
-//! The default method of rapier: soft contacts in substeps, the two normal rows of a contact solved together, and
-//! stabilizing sweeps with friction.
+//! The default method of rapier: soft contacts in substeps, the two normal rows of a contact solved together,
+//! and stabilizing sweeps with friction.
 //!
-//! **Source.** `crozet2025rapier` (2D, version 0.35); the pair of rows is that of
-//! [`super::pgs_ngs_block`] with soft rows on its diagonal. Normal rows come before friction rows: with the other order
-//! `many_pyramids` overlaps by 9 % more, and rapier itself does not (`papers/peers.md`).
+//! **Source.** `crozet2025rapier` (2D, version 0.35). The pair of rows is that of [`super::pgs_ngs_block`],
+//! with soft rows on its diagonal. Normal rows come before friction rows: in the other order, `many_pyramids`
+//! overlaps by 9 % more, which rapier itself does not (`papers/peers.md`).
 //!
-//! **Departures.** A stiffness clamp of an eighth of the substep rate is kept, which rapier leaves to
-//! its user; at its standard 4 substeps both have 30 Hz. Pairs with a determinant below a
-//! thousandth of the product of their diagonal go row by row; rapier takes a hundredth. Bounces are
-//! this crate's. The order is that of this crate's colors.
+//! **Departures.** The contact frequency is clamped to an eighth of the substep rate, which rapier leaves to
+//! its user; at its standard 4 substeps both have 30 Hz. Pairs with a determinant below a thousandth of the
+//! product of their diagonal are solved row by row; rapier's threshold is a hundredth. Restitution is this
+//! crate's. Contacts are solved in the order of this crate's colors.
 //!
 //! **Agreement.** The source at its best: 4 substeps of 1 and 1 sweep, 30 Hz, ζ 10, 3 m/s. Here: 4 substeps of 1
 //! iteration, 1 relaxing sweep, contact_hertz 30, push_speed 3. Apart from the source's method in `f64` over 10
@@ -19,7 +19,7 @@
 //! without friction and `relax_iterations` rigid block sweeps with it. Sweeps of a step request 1638 B per
 //! contact.
 //!
-//! **Fails when** [`super::soft_step`] does: the block couples two points, not two contacts.
+//! **Fails when** [`super::soft_step`] does: the block couples the two points of a contact, not two contacts.
 
 use super::{Uses, Variant};
 use crate::engine::clock::Phase;

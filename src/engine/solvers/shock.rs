@@ -1,15 +1,15 @@
-//! Sequential impulses, then shock propagation: a last sweep from the ground upward in which whatever
-//! a level stands on cannot move.
+//! Sequential impulses, then shock propagation: a last sweep goes from the ground upward, and the bodies that
+//! a level stands on are immovable in it.
 //!
-//! The contact graph has levels: what touches the ground is on the first, what touches that on the
-//! second. If the body below cannot move, one sweep of a level makes its contacts right, and so one
-//! sweep over all levels a whole stack.
+//! The contact graph has levels: bodies that touch the ground are on level 1, bodies that touch those on
+//! level 2, and so on. If the body below cannot move, one sweep over a level satisfies its contacts. One
+//! sweep over all levels therefore satisfies a whole stack.
 //!
 //! **Source.** `guendelman2003`, section 7; otherwise [`super::pgs`].
 //!
-//! **Departures.** Levels are distances from the nearest body that does not move, not the strongly
-//! connected parts of a graph of who rests on whom. The source propagates shocks through contacts
-//! and not through collisions; here both are one.
+//! **Departures.** A level is the distance from the nearest body that does not move. The source uses the
+//! strongly connected components of a graph of which body rests on which. The source propagates shocks
+//! through contacts but not through collisions; here the two are not distinguished.
 //!
 //! **Agreement.** The source at its best: sweeps until contacts are resolved, then 1 upward. Here: 4 iterations,
 //! baumgarte 0.3. Apart from the source's method in `f64` over 10 iterations by less than 6e-5:
@@ -19,9 +19,9 @@
 //! three passes: effective masses, a sweep, effective masses. Contacts are grouped by level and
 //! color, so that low levels fill few lanes. Sweeps of a step request 1920 B per contact.
 //!
-//! **Fails when** loads on the ground matter: the impulse of the last sweep takes no weight off the
-//! bodies above, and the bodies below do not feel it. Momentum is lost to them. Everything seems lighter
-//! from below, a lever tips over the wrong way, and what swings is damped.
+//! **Fails when** the loads on lower bodies matter. The last sweep pushes the upper bodies without a reaction
+//! on the bodies below, so momentum is lost. Loads appear too light from below, levers tip the wrong way, and
+//! swinging bodies are damped.
 
 use super::{Law, Variant};
 use crate::engine::bodies::Bodies;
@@ -76,7 +76,8 @@ impl Solver for Shock {
             }
             for level in 1..passes.levels() {
                 passes.set_order(SweepOrder::Level(level));
-                // The world and what hangs free of it have no level that is below another.
+                // Bodies without a connection to the ground have the highest level, so they keep their
+                // masses.
                 let factor = |body| if graph.levels()[body] < level { 0.0 } else { 1.0 };
                 passes.scale_masses(Phase::Solve, masses, factor);
                 passes.sweep(Phase::Solve, &rule);

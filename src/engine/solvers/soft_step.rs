@@ -1,14 +1,13 @@
-//! Soft contacts in substeps: instead of sweeping a step often, cut it into substeps and
-//! sweep each once; contacts are stiff springs with strong damping, and a second sweep
-//! without the spring takes out the velocity that the spring put in.
+//! Soft contacts in substeps: instead of many sweeps over one step, the step is cut into substeps with one
+//! sweep each. Contacts are stiff springs with strong damping. A second sweep without the springs removes the
+//! velocity that they added.
 //!
 //! **Source.** `catto2024solver2d` (the schedule), `catto2011` (soft constraints),
 //! `macklin2019` (substeps instead of iterations).
 //!
-//! **Departures.** From the second substep on, the warm start is a pass over bodies, not
-//! over constraints (see [`crate::engine::constraints::kernels::motion::Motion::extrapolate_velocities`]);
-//! in exact arithmetic the result is the same. Contacts with static and kinematic bodies are
-//! twice as stiff, as in the source.
+//! **Departures.** From the second substep on, the warm start is a pass over bodies instead of constraints
+//! (see [`crate::engine::constraints::kernels::motion::Motion::extrapolate_velocities`]); in exact arithmetic
+//! the result is the same. Contacts with static and kinematic bodies are twice as stiff, as in the source.
 //!
 //! **Agreement.** The source at its best: 4 substeps of 1 and 1 sweep, 30 Hz, ζ 10, 2 m/s. Here: 4 substeps of 1
 //! iteration, 1 relaxing sweep, contact_hertz 30, damping_ratio 10, push_speed 3. Apart from the source's method in
@@ -19,10 +18,9 @@
 //! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations`
 //! soft sweeps and `relax_iterations` rigid ones. Sweeps of a step request 1750 B per contact.
 //!
-//! **Fails when** the load is large against the stiffness: at rest a contact sinks by
-//! F/(m_eff ω²), whatever the number of iterations, so tall stacks and heavy bodies on
-//! light ones sag. More substeps allow a higher frequency, and the sag falls with its
-//! square.
+//! **Fails when** the load is large for the stiffness. At rest a contact sinks by F/(m_eff ω²), whatever the
+//! number of iterations, so tall stacks and heavy bodies on light ones sag. More substeps allow a higher
+//! frequency, and the sag falls with the square of the frequency.
 
 use super::{Uses, Variant};
 use crate::engine::clock::Phase;

@@ -1,10 +1,11 @@
-//! Split impulses: overlap is removed by pseudo-velocities of its own, which move bodies once and are
-//! forgotten, so that it never becomes momentum.
+//! Split impulses: overlap is removed by separate pseudo-velocities. They move the bodies once and are then
+//! discarded, so the correction never becomes momentum.
 //!
-//! **Source.** `guendelman2003`, section 5 (velocities for contact apart from those for positions), in
-//! the form of `coumans2015` (a second set of impulses without warm start).
+//! **Source.** `guendelman2003`, section 5 (separate velocities for contacts and for positions), in the form
+//! of `coumans2015` (a second set of impulses without warm starting).
 //!
-//! **Departures.** Overlap is removed without a slop: what adds no energy need not spare any.
+//! **Departures.** Overlap is removed completely, without a slop: the correction adds no energy, so nothing
+//! is gained by leaving some overlap.
 //!
 //! **Agreement.** The source at its best: 10 sweeps, 0.2 of an overlap per step, no slop. Here: 8 iterations, 4
 //! position sweeps, correction 0.2. Apart from the source's method in `f64` over 10 iterations by less than 6e-5:
@@ -15,8 +16,8 @@
 //! `position_iterations` sweeps without friction for pseudo-velocities; impulses and velocities are
 //! put aside and brought back, 4 passes over vectors, in lanes. Sweeps of a step request 2581 B per contact.
 //!
-//! **Fails when** [`super::pgs`] does, except that it does not throw overlapping bodies apart: what the
-//! velocity sweeps leave over is kept as velocity, and pseudo-velocities start cold in each step.
+//! **Fails when** [`super::pgs`] does, except that it does not throw overlapping bodies apart. The residual
+//! of the velocity sweeps stays in the velocities, and pseudo-velocities start at zero in each step.
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
@@ -44,7 +45,7 @@ pub static SOLVER: Variant = Variant {
 /// State from step to step.
 #[derive(Clone, Debug, Default)]
 struct SplitImpulse {
-    /// Rows as they were before bodies are pushed apart.
+    /// Rows before the pseudo-velocities move the bodies.
     before: Vec<BodyRow>,
 }
 
@@ -83,8 +84,8 @@ fn step(passes: &mut Passes<'_>, before: &mut Vec<BodyRow>) {
     }
 }
 
-/// Puts velocities and impulses aside, lets `solve` find others that begin at zero, moves bodies by
-/// them for one substep and brings back those that were put aside.
+/// Saves velocities and impulses, lets `solve` find a second set that starts at zero, moves the bodies with
+/// it for one substep, and restores the saved ones.
 fn with_pseudo_velocities(
     passes: &mut Passes<'_>,
     before: &mut Vec<BodyRow>,

@@ -1,11 +1,13 @@
-//! Staggered projections: loads without friction and friction without loads are solved in turn, each as a convex problem
-//! and each well, until both agree. What they agree on obeys Coulomb's law, not a relaxation of it.
+//! Staggered projections: normal impulses at fixed friction, and friction at fixed normal impulses, are
+//! solved in turn until they agree. Each of the two is a convex problem and is solved well. The result obeys
+//! Coulomb's law, not a relaxation of it.
 //!
 //! **Source.** `kaufman2008`, sections 4 and 7.
 //!
-//! **Departures.** Each of the two quadratic programs is solved in lanes by spectral projected gradients ([`spectral`]),
-//! `inner` iterations or until nothing changes; the source has a dense active-set method. In the plane a cone of friction is an interval, and
-//! needs no facets. Overlap is pushed apart as in [`super::pgs`]. Rows of joints are in both programs, with their bounds.
+//! **Departures.** Each of the two quadratic programs is solved in lanes by spectral projected gradients
+//! ([`spectral`]), for `inner` iterations or until nothing changes; the source uses a dense active-set
+//! method. In 2D a friction cone is an interval and needs no facets. Overlap is pushed apart as in
+//! [`super::pgs`]. Joint rows are in both programs, with their bounds.
 //!
 //! **Agreement.** The source at its best: until the change of a round is small. Here: 4 iterations, baumgarte 0.3,
 //! inner 10. Apart from the solution in `f64` after 2000 iterations by less than 6e-5 (its rounds end at the
@@ -14,8 +16,8 @@
 //! **Cost.** Per substep 2 body passes, 1 warm start and in each of `velocity_iterations` rounds up to 2 `inner` times 3 passes
 //! over vectors in lanes. Sweeps of a step request 44059 B per contact.
 //!
-//! **Fails when** load and friction of a point need each other, as under a rod that leans: a round is then worth no more than a
-//! sweep. And when `inner` is too small for the height of a pile.
+//! **Fails when** the load and the friction of a point depend strongly on each other, as under a leaning rod:
+//! a round then gains no more than a sweep. Also when `inner` is too small for the height of a pile.
 //!
 //! # The method
 //!
@@ -24,7 +26,7 @@
 //! f(λ) = ½ λᵀ (K + R) λ + λᵀ (J v* + b)
 //! ```
 //!
-//! At a fixed point λn is complementary to un, and λt dissipates most.
+//! At a fixed point, λn is complementary to un, and λt dissipates the most energy.
 //!
 //! [`spectral`]: crate::engine::constraints::vectors::spectral
 
@@ -111,12 +113,12 @@ fn solve(
     (0..count).for_each(|_| passes.count_sweep(1));
 }
 
-/// λn ≥ 0; a negative µ marks what is no contact, and stays as it is.
+/// Projection on λn ≥ 0. A negative µ marks entries that are not contacts; they stay unchanged.
 fn pushing([normal, tangent]: PointEntry, friction: Wide) -> PointEntry {
     [(-friction).select_positive(normal, Lanes::max(normal, Wide::zero())), tangent]
 }
 
-/// |λt| ≤ µ λn.
+/// Projection on |λt| ≤ µ λn.
 fn within_friction([normal, tangent]: PointEntry, friction: Wide) -> PointEntry {
     let bound = friction * normal;
     [normal, (-friction).select_positive(tangent, Lanes::max(Lanes::min(tangent, bound), -bound))]

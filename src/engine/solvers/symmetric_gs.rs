@@ -1,12 +1,12 @@
 //! Symmetric Gauss–Seidel: every sweep over the contacts is followed by one in reverse order.
 //!
-//! A forward sweep carries news upward through a stack within one sweep, and downward by one contact a
-//! sweep; a symmetric pair carries them both ways.
+//! A forward sweep carries a change up a whole stack, but down by only one contact. A forward and a backward
+//! sweep together carry it both ways.
 //!
 //! **Source.** `cottle1992` (splittings of a linear complementarity problem); otherwise [`super::pgs`].
 //!
-//! **Departures.** Colors are taken in reverse, and within a contact rows keep their order: the
-//! splitting is symmetric by contacts, not by rows.
+//! **Departures.** The colors are visited in reverse order, but the rows within a contact keep their order.
+//! The splitting is therefore symmetric by contacts, not by rows.
 //!
 //! **Agreement.** The source at its best: until a residual is reached. Here: 4 iterations, baumgarte 0.3. Apart from
 //! the source's method in `f64` over 10 iterations by less than 6e-5: `simpulse agree --solvers symmetric_gs`.
@@ -15,8 +15,9 @@
 //!
 //! **Cost.** That of [`super::pgs`]; an iteration is two sweeps. Sweeps of a step request 1750 B per contact.
 //!
-//! **Fails when** [`super::pgs`] does. In natural order a column of discs converges by 0.957
-//! per iteration and by 0.976 per plain sweep, which is no gain per sweep; colors carry news by one contact a sweep either way.
+//! **Fails when** [`super::pgs`] does. In natural order, the error of a column of discs shrinks to 0.957 of
+//! its size per iteration, and to 0.976 per plain sweep: no gain per sweep. In colored order, changes travel
+//! one contact per sweep in either direction.
 
 use super::{Law, Variant};
 use crate::engine::clock::Phase;

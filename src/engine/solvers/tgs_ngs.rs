@@ -1,11 +1,11 @@
-//! Substeps with a rigid velocity sweep and a position sweep each: velocities carry no position
-//! feedback, overlap is removed from positions alone.
+//! Substeps with one rigid velocity sweep and one position sweep each. Velocities get no position feedback:
+//! overlap is removed from positions only.
 //!
 //! **Source.** `catto2024solver2d`, `solve_tgs_ngs`.
 //!
-//! **Departures.** Impulses are applied again at every substep, as in the source, by a pass over
-//! bodies from the second substep on (see [`super::soft_step`]). Velocity rows keep the arms of the
-//! start of the step; those of position rows turn with the bodies.
+//! **Departures.** Impulses are applied again in every substep, as in the source; from the second substep on,
+//! this is a pass over bodies (see [`super::soft_step`]). Velocity rows keep the arms of the start of the
+//! step; the arms of position rows turn with the bodies.
 //!
 //! **Agreement.** The source at its best: 4 substeps of 1 sweep and 1 position sweep, correction 0.2. Here: 4
 //! substeps of 1 iteration, 1 position sweep, correction 0.2. Apart from the source's method in `f64` over 10
@@ -15,8 +15,8 @@
 //! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations` velocity
 //! sweeps and `position_iterations` position sweeps. Sweeps of a step request 1574 B per contact.
 //!
-//! **Fails when** contacts are rigid and the budget is small: without a relaxing sweep what one
-//! sweep leaves over is kept as velocity, and stacks jitter.
+//! **Fails when** the budget is small: contacts are rigid and there is no relaxing sweep, so the residual of
+//! a sweep stays in the velocities and stacks jitter.
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;

@@ -1,10 +1,10 @@
-//! Soft contacts in substeps whose Jacobians follow the bodies: anchors turn within the step.
+//! Soft contacts in substeps, with Jacobians that follow the bodies: anchors turn within the step.
 //!
-//! **Source.** `catto2024solver2d`, `solve_tgs_soft`. It differs from [`super::soft_step`] in the
-//! arms alone: those of the start of the step, turned by what each body has turned since.
+//! **Source.** `catto2024solver2d`, `solve_tgs_soft`. The only difference from [`super::soft_step`] is the
+//! arms: the arms of the start of the step, turned by the rotation of each body since then.
 //!
-//! **Departures.** Effective masses stay those of the start of the step, as in the source. The
-//! direction n of a contact stays, too.
+//! **Departures.** Effective masses stay those of the start of the step, as in the source. So does the normal
+//! n of a contact.
 //!
 //! **Agreement.** The source at its best: 4 substeps of 1 and 1 sweep, 30 Hz, ζ 10, 4 m/s. Here: 4 substeps of 1
 //! iteration, 1 relaxing sweep, contact_hertz 30, push_speed 4. Apart from the source's method in `f64` over 10
@@ -16,8 +16,8 @@
 //! constraints in every substep; [`super::soft_step`] needs a pass over bodies for it. Sweeps of a step request
 //! 2216 B per contact.
 //!
-//! **Fails when** [`super::soft_step`] does. What it gains shows where bodies turn by more than some
-//! degrees within a step; what it costs, always.
+//! **Fails when** [`super::soft_step`] does. The benefit shows only where bodies turn by more than a few
+//! degrees within a step; the cost is always paid.
 
 use super::{Uses, Variant};
 use crate::engine::clock::Phase;

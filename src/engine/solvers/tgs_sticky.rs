@@ -1,12 +1,12 @@
-//! Substeps in which friction holds points at a place: what creeps is brought back.
+//! Substeps in which friction holds points in place: a drift along the surface is pulled back.
 //!
 //! **Source.** `catto2024solver2d`, `solve_tgs_sticky`.
 //!
-//! **Departures.** A point keeps how far it has drifted, not two anchors. It sticks again in the sweep in
-//! which it slides; the source's waits for the next step. A cone is that of the mean normal
-//! impulse of the points that are there; the source takes half of the sum, also where there is one. Arms are
-//! those of the start of the step. In relaxing sweeps a gap may close and no more; the source, which passes 1/h = 0 to
-//! them, takes the approach away at any gap.
+//! **Departures.** A point stores its drift instead of two anchors. A sliding point sticks again in the same
+//! sweep; in the source, in the next step. The cone of a point is that of the mean normal impulse of the
+//! existing points; the source takes half of the sum, even if there is only one point. Arms are those of the
+//! start of the step. In relaxing sweeps, a gap may close but no more; the source passes 1/h = 0 there, and
+//! so removes the approach velocity at any gap.
 //!
 //! **Agreement.** The source at its best: 4 substeps, 2 relaxing sweeps, β 0.8, stick 0.5, 4 m/s. Here: 4 substeps of
 //! 1 iteration, 2 relaxing sweeps, baumgarte 0.8, stick 0.5, push_speed 4. Apart from the source's method in `f64`
@@ -19,8 +19,8 @@
 //! `relax_iterations` sticky sweeps without push, 1 pass that brings drifts into the order of the lanes and 1 that
 //! books them. Sweeps of a step request 1292 B per contact.
 //!
-//! **Fails when** stacks are tall: without a warm start each step begins cold, and 0.8 of an
-//! overlap per substep is pushed out as velocity.
+//! **Fails when** stacks are tall: there is no warm start, so each step begins cold, and in every substep 0.8
+//! of an overlap is pushed out through velocities.
 
 use super::{Law, Uses, Variant};
 use crate::engine::clock::Phase;
@@ -68,7 +68,7 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// Points that are farther apart (m) do not stick.
+/// Points with a larger separation (m) do not stick.
 const REACH: f32 = 2.0 * LINEAR_SLOP;
 
 /// State from step to step.
@@ -101,7 +101,7 @@ impl Solver for TgsSticky {
             }
             passes.bounce(substep);
         }
-        // Impulses add up over the whole step, as nothing is applied twice.
+        // Impulses accumulate over the whole step, because none is applied twice.
         passes.book_impulses();
         self.drifts.book(passes, reach);
     }

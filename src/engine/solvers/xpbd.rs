@@ -1,12 +1,13 @@
-//! Position-based dynamics: bodies move first, contacts displace them, and velocities are what
-//! the displacements made of them.
+//! Position-based dynamics: bodies move first, contacts displace them, and velocities are computed from the
+//! displacements.
 //!
 //! **Source.** `muller2020`; `macklin2016` (compliance, zero by default); `catto2024solver2d`, `solve_xpbd`.
 //!
-//! **Departures.** Velocities are corrected by (x − x_before contacts)/h, which is (x − x₀)/h in exact
-//! arithmetic, so that contacts without overlap change no bit. Friction holds places of the start of the
-//! step (`catto2024solver2d`), not of the substep. Velocities are corrected on arms of the start of the step. Springs
-//! and motors of joints are rows of velocities, solved once per substep before bodies move, instead of compliances.
+//! **Departures.** Velocities are corrected by (x − x_before contacts)/h, which in exact arithmetic gives (x
+//! − x₀)/h; contacts without overlap therefore change no bit. Friction holds points where they were at the
+//! start of the step (`catto2024solver2d`), not of the substep. Velocity corrections use the arms of the
+//! start of the step. Springs and motors of joints are velocity rows, solved once per substep before bodies
+//! move, instead of compliances.
 //!
 //! **Agreement.** The source at its best: 4 to 20 substeps of 1 iteration, no compliance, 4 m/s. Here: 4 substeps of
 //! 1 position sweep, push_speed 4, compliance 0. Apart from the source's method in `f64` over 10 substeps by less
@@ -16,10 +17,10 @@
 //! **Cost.** Per substep 4 body passes, `position_iterations` displacing sweeps, which gather bodies
 //! twice, and 1 velocity sweep. Sweeps of a step request 1873 B per contact.
 //!
-//! **Fails when** stacks are tall or loads heavy: there is no warm start, so each substep begins
-//! cold, and what a sweep leaves over sinks in. Overlap deeper than the limit is pushed apart at
-//! the limit's speed, and that speed stays. With compliance a load sinks in by α times its weight only
-//! while that is less than the limit's speed times h.
+//! **Fails when** stacks are tall or loads heavy: there is no warm start, so each substep begins cold, and
+//! the residual of a sweep remains as overlap. Overlap deeper than the limit is pushed apart at the speed
+//! limit, and the bodies keep that speed. With compliance, a load sinks in by α times its weight only while
+//! that is less than the speed limit times h.
 
 mod displace;
 
@@ -63,9 +64,9 @@ pub static SOLVER: Variant = Variant {
 /// State from step to step.
 #[derive(Clone, Debug, Default)]
 struct Xpbd {
-    /// Rows as they were before a substep displaced them.
+    /// Rows before a substep displaced them.
     before: Vec<BodyRow>,
-    /// Rebound speeds of points (m/s), as normal entries; empty where nothing bounces.
+    /// Rebound speeds of points (m/s), as normal entries; empty if nothing bounces.
     rebounds: PointVector,
 }
 

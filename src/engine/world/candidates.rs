@@ -1,4 +1,4 @@
-//! Pairs of shapes whose bounds overlap, kept while they do.
+//! Candidates: pairs of shapes whose bounds overlap, kept while they do.
 
 use super::World;
 use crate::engine::contacts::pair_key;
@@ -6,13 +6,13 @@ use crate::engine::narrowphase::batch::{NO_CONTACT, PairKind};
 use crate::engine::narrowphase::candidate::Candidate;
 use crate::engine::params::SPECULATIVE_DISTANCE;
 
-/// Rounding of a squared distance (1).
+/// Allowance for rounding in a squared distance (1).
 const REACH_ROUNDING: f32 = 1.0 + 1e-5;
 
 impl World {
-    /// Candidates from `self.pairs`; those that were there before keep their contact.
+    /// Rebuilds the candidates from `self.pairs`; persisting ones keep their contact.
     ///
-    /// Both lists are sorted by shape pair, so that this is one walk along both.
+    /// Both lists are sorted by shape pair, so one walk along both is enough.
     pub(super) fn update_candidates(&mut self) {
         let narrow = &mut self.narrow;
         std::mem::swap(&mut narrow.candidates, &mut narrow.last_candidates);
@@ -51,7 +51,7 @@ impl World {
             narrow.candidates.push(candidate);
         }
         narrow.jobs_are_current = false;
-        // A contact whose candidate is gone goes with it.
+        // A contact is removed together with its candidate.
         narrow.is_changed |= kept != self.contacts.len();
     }
 }

@@ -1,4 +1,4 @@
-//! From candidates to contacts that remember their impulses.
+//! Updates contacts from candidates and carries their impulses from step to step.
 
 use super::World;
 use crate::engine::constraints::Solver;
@@ -15,45 +15,46 @@ use glam::Vec2;
 /// State of the narrow phase between steps.
 #[derive(Clone, Default)]
 pub(super) struct Narrow {
-    /// Sorted by shape pair.
+    /// Candidates, sorted by shape pair.
     pub candidates: Vec<Candidate>,
     pub last_candidates: Vec<Candidate>,
     /// Candidates by [`PairKind`].
     pub of_kind: [Vec<u32>; PairKind::ALL.len()],
     /// Shapes as the lane kernels read them.
     pub shapes: Shapes,
-    /// The set of contacts differs from the one that the lanes hold.
+    /// Whether the set of contacts differs from the one assigned to lanes.
     pub is_changed: bool,
-    /// The jobs are all candidates, with their present contacts.
+    /// Whether the jobs are all candidates with their current contacts.
     pub jobs_are_current: bool,
     /// The solver's requests to the collision phase.
     asked: Collision,
     poses: Vec<PoseRow>,
     ways: Vec<Quad>,
     jobs: [Jobs; PairKind::ALL.len()],
-    /// New contacts, in the order in which they were met.
+    /// New contacts, in the order in which they were found.
     fresh: Vec<Contact>,
     last_contacts: Vec<Contact>,
-    /// Contacts there were after the last update.
+    /// Number of contacts after the last update.
     count: usize,
 }
 
-/// Steps that ways are made of (1): a sweep that relaxes at the end of a step looks a substep ahead.
+/// Length of the predicted motion `ways` in steps (1): the relax sweep at the end of a step looks one substep
+/// ahead.
 const AHEAD: f32 = 1.25;
 
-/// `Candidate::contact` of a pair that has just begun to touch: this bit and its place in `fresh`.
+/// `Candidate::contact` of a pair that has just begun to touch: this bit and the index in `fresh`.
 const FRESH: u32 = 1 << 31;
 
 impl World {
-    /// Collides every candidate and hands the last step's impulses on by feature id.
+    /// Runs the narrow phase on every candidate and carries the last step's impulses over by feature id.
     ///
-    /// Contacts are updated where they lie, and sorted again only if one came or went.
+    /// Contacts are updated in place, and sorted again only if one was added or removed.
     pub(super) fn update_contacts(&mut self) {
         self.make_solver();
         self.scale_impulses();
         let narrow = &mut self.narrow;
         if narrow.count != self.contacts.len() {
-            // The caller changed the list: places that candidates remember are invalid.
+            // The caller changed the list: the contact indices of candidates are invalid.
             self.contacts.clear();
             narrow.candidates.iter_mut().for_each(|c| c.contact = NO_CONTACT);
             (narrow.is_changed, narrow.jobs_are_current) = (true, false);
@@ -103,7 +104,7 @@ impl World {
             };
             *is_changed = true;
         };
-        // Ways are longer than a step.
+        // `ways` covers more than a step.
         let rolling = asked.rolling.map(|Rolling { limit }| Rolling { limit: AHEAD * limit });
         let input = Input { poses, ways, rolling, shapes, margins: Margins::of(self.settings.length_unit) };
         for (kind, jobs) in PairKind::ALL.into_iter().zip(jobs) {
@@ -122,7 +123,7 @@ impl World {
         self.counts.rows = if self.features.friction { 2 * points } else { points };
     }
 
-    /// Creates the solver that the settings name, if it is not the present one.
+    /// Creates the solver that the settings name, unless it is already active.
     fn make_solver(&mut self) {
         let solver = self.settings.solver;
         if !std::ptr::eq(self.solver_is, solver) {
@@ -130,7 +131,7 @@ impl World {
         }
     }
 
-    /// Scales the impulses of the last substep to a new substep length: the forces stay the same.
+    /// Scales the impulses of the last substep to a new substep length, so that forces stay the same.
     fn scale_impulses(&mut self) {
         let h = self.settings.h();
         let Some(old) = self.impulses_of.replace(h).filter(|old| *old != h) else { return };
@@ -140,7 +141,7 @@ impl World {
         }
     }
 
-    /// Calls a hook of the solver.
+    /// Calls a collision hook of the solver.
     fn with_scene(&mut self, hook: impl FnOnce(&mut dyn Solver, &mut CollisionScene<'_>)) {
         let Narrow { candidates, of_kind, poses, is_changed, .. } = &self.narrow;
         let mut scene = CollisionScene {
@@ -163,7 +164,7 @@ impl World {
 }
 
 impl Narrow {
-    /// Poses of all bodies in the collision of this step.
+    /// Poses of all bodies at the collision phase of this step.
     pub fn poses(&self) -> &[PoseRow] {
         &self.poses
     }
@@ -181,13 +182,13 @@ impl Narrow {
             + held(&self.asked.keep)
     }
 
-    /// Bytes held for contacts, besides the list itself.
+    /// Bytes held for contacts, without the list itself.
     pub fn contact_bytes(&self) -> usize {
         held(&self.fresh) + held(&self.last_contacts)
     }
 
-    /// Lets candidates find their contacts in a list that replaced the last one;
-    /// both are sorted by shape pair. Contacts without a candidate are forgotten.
+    /// Links candidates to their contacts in a list that replaced the last one. Both are sorted by shape
+    /// pair. Contacts without a candidate are dropped.
     pub fn relink(&mut self, contacts: &mut Vec<Contact>) {
         self.last_contacts.clone_from(contacts);
         let mut last = self.last_contacts.iter().enumerate().peekable();
@@ -202,10 +203,10 @@ impl Narrow {
         (self.is_changed, self.count) = (true, contacts.len());
     }
 
-    /// Lists the candidates that may touch; returns the points of manifolds that are kept.
+    /// Lists the candidates that may touch; returns the number of points of manifolds that are kept.
     ///
-    /// Where most candidates do not touch, those whose centers are too far apart are left out
-    /// before their shapes are read; where most do, the lists of the last step still hold.
+    /// If most candidates do not touch, those whose centers are too far apart are skipped before their shapes
+    /// are read. If most touch, the lists of the last step are reused.
     fn list_jobs(&mut self, contacts: &[Contact]) -> usize {
         let cull = 4 * contacts.len() < 3 * self.candidates.len();
         if !self.asked.keep.is_empty() {
@@ -221,7 +222,7 @@ impl Narrow {
         0
     }
 
-    /// The same; `KEEPS`: some manifolds may be kept.
+    /// Fills the job lists; `KEEPS`: some manifolds may be kept.
     fn list<const KEEPS: bool>(&mut self, cull: bool) {
         let keep = &self.asked.keep;
         for (jobs, names) in self.jobs.iter_mut().zip(&self.of_kind) {
@@ -240,7 +241,7 @@ impl Narrow {
         }
     }
 
-    /// Contacts in the order of their candidates: old ones that go on, and fresh ones.
+    /// Puts contacts in the order of their candidates, persisting and fresh ones together.
     fn sort_contacts(&mut self, contacts: &mut Vec<Contact>) {
         std::mem::swap(contacts, &mut self.last_contacts);
         contacts.clear();

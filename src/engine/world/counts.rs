@@ -23,15 +23,15 @@ pub struct StepCounts {
     pub overflow: usize,
     /// Lanes in all batches; occupancy is `contacts / lane_slots`.
     pub lane_slots: usize,
-    /// Bodies that moved farther than half their width; only with continuous collision.
+    /// Bodies that moved farther than half their width; counted only with continuous collision.
     pub fast: usize,
     /// Bytes of prepared constraint records.
     pub constraint_bytes: usize,
-    /// Points solved by impacts before the step, counted as often as they were.
+    /// Points solved by impacts before the step; repeated visits count again.
     pub impact_visits: usize,
-    /// Islands whose impacts reached their bound of visits; sweeps stop what still approaches there.
+    /// Islands whose impacts reached their limit of visits; sweeps then stop the remaining approach.
     pub cut_impacts: usize,
-    /// Substeps that were too large for the solver's own method, so that sweeps alone solved them.
+    /// Substeps whose problem was too large for the solver's own method, so that sweeps alone solved them.
     pub unsolved: usize,
 }
 
@@ -45,9 +45,9 @@ pub enum Quantity {
     Speed,
     /// Its spin (rad/s).
     Spin,
-    /// Its position, which is not finite.
+    /// Its position, if not finite.
     Position,
-    /// Its angle, which is not finite.
+    /// Its angle, if not finite.
     Angle,
 }
 
@@ -56,10 +56,10 @@ pub enum Quantity {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
 pub enum Criterion {
-    /// Speeds within bounds; finite positions and angles.
+    /// Speeds within bounds, finite positions and angles.
     #[default]
     Bounds,
-    /// Kinetic energy that has a source.
+    /// Kinetic energy explained by its sources.
     Energy,
 }
 

@@ -9,25 +9,25 @@ use crate::engine::error::Error;
 use crate::engine::shapes::{Aabb, MassProperties, Shape};
 use glam::Vec2;
 
-/// Which bodies there are.
+/// Body slots: which indices are in use.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Slots {
-    /// Of the body that is or was last at an index; `[bodies]`.
+    /// Generation of the current or last body at each index. `[bodies]`
     pub generation: Vec<u32>,
-    /// Whether there is one; `[bodies]`.
+    /// Whether the index is in use. `[bodies]`
     pub lives: Vec<bool>,
-    /// First shape of each body; its shapes follow one another. `[bodies]`
+    /// First shape of each body; its shapes are consecutive. `[bodies]`
     pub first_shape: Vec<u32>,
-    /// Shapes of each body; `[bodies]`.
+    /// Number of shapes of each body. `[bodies]`
     pub shapes: Vec<u32>,
-    /// Bodies whose places may be taken.
+    /// Indices that may be reused.
     pub free: Vec<u32>,
-    /// Bodies removed since the last step; solvers forget them in the next.
+    /// Bodies removed since the last step; their indices may be reused after the next.
     pub removed: Vec<u32>,
 }
 
-/// Persistent forces of a body before others were applied for one step.
+/// Persistent force and torque of a body, saved before those for one step are added.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct StandingForces {
@@ -36,14 +36,14 @@ pub(super) struct StandingForces {
     torque: f32,
 }
 
-/// Where nothing is.
+/// Bounding box of an empty slot.
 const NOWHERE: Aabb = Aabb { min: Vec2::NAN, max: Vec2::NAN };
 
 impl World {
-    /// Adds a body; the handle stays valid until it is removed.
+    /// Adds a body. The handle stays valid until the body is removed.
     ///
-    /// A body takes the place of one that was removed before the last step and had as many shapes, if there is one.
-    /// Errors: as [`BodyDef::check`].
+    /// The body reuses the index of a body that was removed before the last step and had the same number of
+    /// shapes, if there is one. Errors: as [`BodyDef::check`].
     ///
     /// ```
     /// # use simpulse_engine as simpulse;
@@ -87,7 +87,7 @@ impl World {
         Ok(BodyHandle { index: index as u32, generation: self.slots.generation[index] })
     }
 
-    /// Room for a body and its shapes, behind all others.
+    /// Appends a slot for a body and its shapes; returns the body's index.
     pub(super) fn push_body(&mut self, body: &BodyDef, mass: &MassProperties, shapes: usize) -> usize {
         let index = self.bodies.push(body, mass);
         let slots = &mut self.slots;
@@ -104,7 +104,7 @@ impl World {
         index
     }
 
-    /// Makes shape `i`, of body `body`, one of this kind and this friction and restitution.
+    /// Sets shape `i` of body `body`, with its friction and restitution.
     pub(super) fn set_shape(
         &mut self,
         i: usize,
@@ -112,7 +112,7 @@ impl World {
         shape: Shape,
         [friction, restitution]: [f32; 2],
     ) {
-        // Fat boxes are made at the next step.
+        // Fat boxes are computed in the next step.
         let aabb = shape.aabb(&self.bodies.pose(body));
         let (class, number) = self.narrow.shapes.push(&shape);
         self.shapes[i] = shape;
@@ -128,10 +128,11 @@ impl World {
         self.proxies[i] = Proxy { aabb, body: body as u32, group, dynamic };
     }
 
-    /// Removes a body, its contacts and its joints. Other handles stay valid, and so do indices of other bodies.
+    /// Removes a body, its contacts and its joints. Handles and indices of other bodies stay valid.
     ///
-    /// Until its index is reused, it names a static body that nothing touches. `contacts` remain those of the last
-    /// step until the next. Errors: the body was removed before; a constraint of another type is on it.
+    /// Until its index is reused, it belongs to a static body without contacts. `contacts` lists those of the
+    /// last step until the next step. Errors: the body was removed before; a constraint from
+    /// [`World::add_constraints`] is attached to it.
     ///
     /// ```
     /// # use simpulse_engine as simpulse;
@@ -168,7 +169,7 @@ impl World {
         Ok(())
     }
 
-    /// Takes a body's shapes, `count` from `first` on, out of the broad phase.
+    /// Removes a body's shapes, `count` of them starting at `first`, from the broad phase.
     pub(super) fn leave_world(&mut self, body: usize, first: usize, count: usize) {
         for proxy in &mut self.proxies[first..first + count] {
             (proxy.aabb, proxy.dynamic) = (NOWHERE, false);
@@ -176,19 +177,20 @@ impl World {
         self.fat_boxes.remove(body);
     }
 
-    /// Whether the body was not removed.
+    /// Whether the body is still in the world.
     pub fn contains(&self, body: BodyHandle) -> bool {
         self.index_of(body).is_ok()
     }
 
-    /// The index of a body. Errors: it was removed.
+    /// The index of a body. Errors: the body was removed.
     pub fn index_of(&self, body: BodyHandle) -> Result<usize, Error> {
         let (i, slots) = (body.index(), &self.slots);
         let is_same = slots.generation.get(i) == Some(&body.generation) && slots.lives[i];
         if is_same { Ok(i) } else { Err(Error::Removed { body: i }) }
     }
 
-    /// The handle of the body at an index, as contacts and divergences name it; none if no body is there.
+    /// The handle of the body at an index, as found in contacts and divergences; `None` if the index is not
+    /// in use.
     pub fn handle(&self, index: usize) -> Option<BodyHandle> {
         let lives = self.slots.lives.get(index).copied().unwrap_or(false);
         lives.then(|| BodyHandle { index: index as u32, generation: self.slots.generation[index] })
@@ -199,7 +201,8 @@ impl World {
         (0..self.bodies.len()).filter_map(|i| self.handle(i))
     }
 
-    /// Moves a body: the origin of its frame to `position` (m), its angle to `angle` (rad). The velocity stays.
+    /// Moves a body: sets the origin of its frame to `position` (m) and its angle to `angle` (rad). The
+    /// velocity is unchanged.
     ///
     /// Errors: the body was removed; a value that is not finite.
     ///
@@ -240,8 +243,8 @@ impl World {
     }
 
     /// Applies a force (N) at the center of mass during the next step only, in addition to the persistent
-    /// [`Bodies::force_x`](crate::engine::bodies::Bodies::force_x), which lasts until it is changed. Only dynamic
-    /// bodies are moved by it.
+    /// [`Bodies::force_x`](crate::engine::bodies::Bodies::force_x), which lasts until it is changed. It moves
+    /// only dynamic bodies.
     ///
     /// Errors: the body was removed; a value that is not finite.
     ///
@@ -320,7 +323,7 @@ impl World {
         Ok(())
     }
 
-    /// Kernels of scenes without rotation omit it.
+    /// Enables rotation if `spin` is not 0. Kernels of scenes without rotation omit it.
     fn may_spin(&mut self, spin: f32) {
         if spin != 0.0 {
             self.traits.spins();
@@ -328,7 +331,7 @@ impl World {
         }
     }
 
-    /// After a step: forces that were applied for it go, and places of removed bodies may be taken.
+    /// After a step: restores persistent forces and frees the indices of removed bodies.
     pub(super) fn end_edits(&mut self) {
         while let Some(StandingForces { body, force, torque }) = self.applied.pop() {
             let i = body as usize;
@@ -338,7 +341,7 @@ impl World {
         self.slots.free.append(&mut self.slots.removed);
     }
 
-    /// Adds constraints of another type than contacts. They take part in every pass of the solver.
+    /// Adds constraints of a type of your own. They take part in every pass of the solver.
     pub fn add_constraints(&mut self, kind: Box<dyn ConstraintType>) {
         self.add_type(kind);
         self.lanes_are_for = None;

@@ -7,45 +7,46 @@ use crate::engine::error::Error;
 use crate::engine::params::HIT_SPEED;
 use glam::{DVec2, Vec2};
 
-/// An event of a contact in the last step. Bodies and shapes are in the order of the [`Contact`].
+/// A contact event in the last step. Bodies and shapes are in the order of the [`Contact`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ContactEvent {
-    /// Two shapes came within [`SPECULATIVE_DISTANCE`](crate::engine::params::SPECULATIVE_DISTANCE), where contacts begin.
+    /// Two shapes came within [`SPECULATIVE_DISTANCE`](crate::engine::params::SPECULATIVE_DISTANCE), at which
+    /// contacts begin.
     Begin {
         /// The bodies.
         bodies: [BodyHandle; 2],
         /// Indices of the shapes.
         shapes: [u32; 2],
     },
-    /// They separated, or one was removed; its handle is then invalid.
+    /// The shapes separated, or a body was removed; its handle is then invalid.
     End {
         /// The bodies.
         bodies: [BodyHandle; 2],
         /// Indices of the shapes.
         shapes: [u32; 2],
     },
-    /// They approached faster than [`HIT_SPEED`] and pushed each other. A solver with soft contacts stops a body over several
-    /// steps, and each of them may be a hit.
+    /// The shapes approached faster than [`HIT_SPEED`] and pushed each other. A solver with soft contacts
+    /// stops a body over several steps, each of which may report a hit.
     Hit {
         /// The bodies.
         bodies: [BodyHandle; 2],
         /// Indices of the shapes.
         shapes: [u32; 2],
-        /// Midway between the points that were pushed (m).
+        /// Mean of the contact points (m).
         point: [f64; 2],
         /// Unit vector from the first body to the second.
         normal: Vec2,
-        /// Speed of approach along the normal before the step (m/s), > 0.
+        /// Approach speed along the normal before the step (m/s), > 0.
         approach_speed: f32,
-        /// Normal impulse of the whole step, of all points (N·s).
+        /// Normal impulse of the whole step, summed over all points (N·s).
         impulse: f32,
     },
 }
 
-/// A point of a contact in the world.
+/// A contact point in world coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactPoint {
-    /// Where it is (m), as of the start of the last step.
+    /// Position (m): the center of body b plus the arm found at the start of the last step.
     pub position: [f64; 2],
     /// Unit vector from body a to body b.
     pub normal: Vec2,
@@ -57,7 +58,7 @@ pub struct ContactPoint {
     pub tangent_impulse: f32,
 }
 
-/// Touching pairs.
+/// A pair of touching shapes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct TouchingPair {
@@ -66,18 +67,18 @@ struct TouchingPair {
     shapes: [u32; 2],
 }
 
-/// Events of the last step, and what finds those of the next.
+/// Events of the last step, and the state for finding those of the next.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Events {
     #[cfg_attr(feature = "serde", serde(skip))]
     list: Vec<ContactEvent>,
-    /// After the last step, sorted by key.
+    /// Touching pairs after the last step, sorted by key.
     touching: Vec<TouchingPair>,
     #[cfg_attr(feature = "serde", serde(skip))]
     last_touching: Vec<TouchingPair>,
     #[cfg_attr(feature = "serde", serde(skip))]
-    /// Speed of approach before the step (m/s) and point (m) of each contact.
+    /// Approach speed before the step (m/s) and point (m) of each contact.
     approach: Vec<(f32, DVec2)>,
 }
 
@@ -111,7 +112,8 @@ impl World {
         &self.events.list
     }
 
-    /// Contacts of a body in the last step, by a search through all contacts. Errors: the body was removed.
+    /// Contacts of a body in the last step, found by a search through all contacts. Errors: the body was
+    /// removed.
     ///
     /// ```
     /// # use simpulse_engine as simpulse;
@@ -135,7 +137,7 @@ impl World {
         Ok(self.contacts.iter().filter(move |c| c.body_a == i || c.body_b == i))
     }
 
-    /// The points of a contact of the last step, in the world.
+    /// The points of a contact of the last step, in world coordinates.
     pub fn points_of<'a>(&'a self, contact: &'a Contact) -> impl Iterator<Item = ContactPoint> + 'a {
         let [x, y] = self.bodies.center(contact.body_b as usize);
         contact.manifold.points().iter().map(move |point| ContactPoint {
@@ -147,7 +149,7 @@ impl World {
         })
     }
 
-    /// Notes how fast bodies approach at each contact, before the step changes it.
+    /// Records the approach speed at each contact before the step changes it.
     pub(super) fn note_approach(&mut self) {
         let b = &self.bodies;
         self.events.approach.clear();
@@ -190,7 +192,7 @@ impl World {
             match last.next_if(|old| old.key == key) {
                 Some(old) if old == now => {}
                 old => {
-                    // Of other bodies, whose places these have taken.
+                    // The old pair belonged to other bodies, whose indices were reused.
                     list.extend(old.map(end));
                     list.push(ContactEvent::Begin { bodies, shapes });
                 }

@@ -9,13 +9,13 @@
 //!
 //! Effect of repeats on the state:
 //!
-//! * *pairs* searches all pairs again each time and *color* for all colors, as a step does in which
-//!   many shapes left their bounds and a contact came or went; *collide* finds what it found before.
-//! * *prepare* reads bodies and contacts and writes rows and records: always the same.
-//! * Sweeps go on from each other's velocities and impulses and converge; *warm start* and
-//!   *integrate* add the same velocity each time, *position* and *store* move bodies. None of them
-//!   branches on values, so the work is the same; after some hundred repeats the numbers should
-//!   be brought back by a reset, so that they remain those of a simulation.
+//! * *pairs* searches all pairs and *color* recolors all contacts each time, as in a step in which many
+//!   shapes left their bounds and a contact began or ended; *collide* finds the same contacts again.
+//! * *prepare* reads bodies and contacts and writes rows and records, with the same result each time.
+//! * Sweeps continue from the velocities and impulses of the previous one and converge; *warm start* and
+//!   *integrate* add the same velocity each time; *position* and *store* move bodies. None of them branches
+//!   on values, so the work stays the same. After some hundred repeats a reset should restore the numbers, so
+//!   that they remain those of a simulation.
 
 use super::World;
 use crate::engine::bodies::Bodies;
@@ -28,18 +28,18 @@ use crate::engine::contacts::Contact;
 use crate::engine::lanes::{Block, BodyRow, Counted, LaneWidth, Operations};
 use crate::engine::world::{Order, StepCounts};
 
-/// A frozen world; dropping it resumes the world as if nothing had happened.
+/// A frozen world. Dropping it resumes the world as if nothing had happened.
 pub struct HeldWorld<'w> {
     world: &'w mut World,
     before: Saved,
-    /// Contacts of the step that is held still, with the impulses it ended with.
+    /// Contacts of the frozen step, with the impulses at its end.
     contacts: Vec<Contact>,
     rows: Vec<BodyRow>,
-    /// Records of contacts, colored and serial, and of each other type.
+    /// Records of contacts, colored and serial, and of each other constraint type.
     buffers: Vec<Vec<Block>>,
 }
 
-/// State that a step starts from and that phases change.
+/// State at the start of a step that phases change.
 struct Saved {
     bodies: Bodies,
     contacts: Vec<Contact>,
@@ -58,13 +58,13 @@ struct Saved {
 pub struct Probe {
     /// The phase.
     pub phase: Phase,
-    /// Sweeps or body passes of a step; 1 for what is run once.
+    /// Sweeps or body passes per step; 1 for a phase that runs once.
     pub passes: u32,
-    /// Rows that one pass solves; 0 for a phase that solves none.
+    /// Rows solved per pass; 0 for a phase that solves none.
     pub rows: usize,
-    /// Operations of all passes; none where the phase does not work on lanes.
+    /// Operations of all passes, joints included; `None` if the phase does not work on lanes.
     pub operations: Option<Operations>,
-    /// Contacts on which they were counted: those that have a color. Joints count besides.
+    /// Contacts on which operations were counted: those that have a color. Joints are not in this number.
     pub counted_contacts: usize,
     /// Per pass and contact, by kind of body a: floats of records read and written, rows gathered, half
     /// rows written.
@@ -96,7 +96,7 @@ impl World {
         held
     }
 
-    /// Restores the contacts and links them to the present candidates.
+    /// Restores the contacts and links them to the current candidates.
     fn put_back(&mut self, Saved { contacts, kept, solver, impulses_of, is_changed, .. }: &Saved) {
         self.contacts.clear();
         self.contacts.extend_from_slice(contacts);
@@ -104,11 +104,11 @@ impl World {
         self.work.kept.clone_from(kept);
         self.solver = solver.clone();
         self.impulses_of = *impulses_of;
-        // The list is another, but no contact has come or gone.
+        // The list was replaced, but no contact was added or removed.
         (self.narrow.is_changed, self.lanes_are_for) = (*is_changed, None);
     }
 
-    /// `phase` alone; with `counted`, one lane counts its operations.
+    /// Runs `phase` alone; with `counted`, in one lane that counts its operations.
     fn run_phase(&mut self, clock: &mut Clock, phase: Phase, counted: bool) -> WorkCount {
         let phases = PhaseFilter { only: Some(phase), counted };
         match phase {
@@ -138,28 +138,28 @@ impl World {
 }
 
 impl HeldWorld<'_> {
-    /// The world, as the phases left it.
+    /// The world in the state that the phases left.
     pub fn world(&self) -> &World {
         self.world
     }
 
-    /// Its records and rows.
+    /// The records and rows of the world.
     pub fn workspace(&self) -> &Workspace {
         &self.world.work
     }
 
-    /// Runs everything that a step does in `phase`, `times` times.
+    /// Runs a step's work in `phase`, `times` times.
     pub fn repeat(&mut self, phase: Phase, times: u32) {
         for _ in 0..times {
             self.world.run_phase(&mut Clock::start(false), phase, false);
         }
     }
 
-    /// Runs every phase of a step once, from what the step itself would start with, and returns the time of each,
-    /// pairs searched again. The bodies are restored.
+    /// Runs every phase of a step once, from the state at the start of the step and with a new search for
+    /// pairs. Returns the time of each phase. The bodies are restored.
     ///
-    /// With `net`, pauses in which the thread waited for a processor are subtracted, which costs some microseconds
-    /// per pass outside the measured times.
+    /// With `net`, pauses in which the thread waited for a processor are subtracted, which costs some
+    /// microseconds per pass outside the measured times.
     pub fn step(&mut self, net: bool) -> Timings {
         self.restore_bodies();
         self.restore_types();
@@ -197,11 +197,11 @@ impl HeldWorld<'_> {
         }
     }
 
-    /// The work of each phase, in the order of a step, without phases that the solver or the scene does not have.
-    /// Every phase is run once, at one lane that counts its operations.
+    /// The work of each phase, in the order of a step, without phases that the solver or the scene does not
+    /// have. Every phase runs once, in one lane that counts its operations.
     ///
     /// # Panics
-    /// If a phase runs a pass of another, whatever the filter says.
+    /// If a phase runs a pass of another phase despite the filter.
     pub fn probes(&mut self) -> Vec<Probe> {
         // The same contacts in the same colors, one to a batch.
         let settings = self.world.settings.clone();
@@ -214,7 +214,7 @@ impl HeldWorld<'_> {
         self.restore_types();
         self.world.put_back(&self.before);
         self.world.frozen_step();
-        // Contacts were recolored, so records may have other places.
+        // Contacts were recolored, so records may have moved.
         self.save();
         probes
     }
@@ -230,8 +230,8 @@ impl HeldWorld<'_> {
         }
         let passes = match phase {
             Phase::Pairs | Phase::Collide | Phase::Color => 1,
-            // Rows are loaded before records are made, bounces are tracked before they are applied,
-            // bodies are stored after impulses: several laps, but one run.
+            // Rows are loaded before records are made, bounces are tracked before they are applied, bodies
+            // are stored after impulses: several laps, but one run.
             Phase::Prepare | Phase::Restitution | Phase::Store => laps[phase as usize].min(1),
             _ => laps[phase as usize],
         };
@@ -270,7 +270,7 @@ impl HeldWorld<'_> {
         }
     }
 
-    /// Restores what a step moves, in place: new memory would cost the next step page faults.
+    /// Restores the motion of bodies in place: newly allocated memory would cost the next step page faults.
     fn restore_bodies(&mut self) {
         let (to, from) = (&mut self.world.bodies, &self.before.bodies);
         for (to, from) in [
@@ -294,7 +294,7 @@ impl Drop for HeldWorld<'_> {
         self.restore_bodies();
         self.restore_types();
         self.world.put_back(&self.before);
-        // Bounds may have followed bodies that repeats have moved.
+        // Bounds may have followed bodies moved by repeats.
         self.world.proxies.clone_from(&self.before.proxies);
         self.world.fat_boxes.clone_from(&self.before.fat_boxes);
         self.world.pairs_are_stale = true;

@@ -15,36 +15,36 @@ use std::collections::BTreeSet;
 /// A block of rows of a joint after a step.
 #[derive(Clone, Copy, Debug)]
 pub struct SolvedBlock {
-    /// The joint; none of a constraint of a type of the caller's own.
+    /// The joint; `None` for a constraint of the caller's own type.
     pub joint: Option<JointHandle>,
-    /// Its rows, with the impulses of the last substep.
+    /// The block's rows, with the impulses of the last substep.
     pub block: RowBlock,
-    /// Impulses of the whole step, with `Settings::record_impulses`; else zeros (N·s or N·m·s). `[size]`
+    /// Impulses of the whole step, with `Settings::record_impulses`; zeros otherwise (N·s or N·m·s). `[size]`
     pub step_impulses: [f32; ROWS],
 }
 
-/// Which joints there are, and where they are solved.
+/// Joint slots, and where each joint is solved.
 #[derive(Clone, Debug, Default)]
 pub(super) struct JointSlots {
     /// `[joints]`
     joints: Vec<Option<Joint>>,
     generation: Vec<u32>,
-    /// Places that may be taken.
+    /// Indices that may be reused.
     free: Vec<u32>,
-    /// Place among the types of the workspace, and among the joints of that type; `[joints]`.
+    /// Index of the joint's group among the types of the workspace, and its index in that group; `[joints]`.
     places: Vec<Option<[u32; 2]>>,
-    /// Types of the workspace that are groups of joints; they come last.
+    /// Number of groups of joints; they are the last types of the workspace.
     groups: usize,
-    /// Joints came, changed or went since they were grouped.
+    /// Whether joints were added, changed or removed since they were grouped.
     stale: bool,
-    /// Kept numbers and angles of a world that was read; `[joints]`, or empty.
+    /// Kept numbers and angles of a deserialized world; `[joints]`, or empty.
     read: Vec<(Vec<f32>, f32)>,
-    /// Pairs of bodies that do not collide, the smaller index first.
+    /// Pairs of bodies that do not collide with each other, smaller index first.
     apart: BTreeSet<[u32; 2]>,
 }
 
 impl JointSlots {
-    /// Whether two bodies do not collide.
+    /// Whether a joint keeps two bodies from colliding.
     pub fn keeps_apart(&self, [a, b]: [u32; 2]) -> bool {
         !self.apart.is_empty() && self.apart.contains(&[a.min(b), a.max(b)])
     }
@@ -69,7 +69,7 @@ impl JointSlots {
     }
 }
 
-/// Notes the bodies of a joint, if it keeps them from colliding.
+/// Records the bodies of a joint that keeps them from colliding.
 fn keep_apart(apart: &mut BTreeSet<[u32; 2]>, joint: &Joint) {
     if !joint.collide_connected {
         let [a, b] = [joint.a.index() as u32, joint.b.index() as u32];
@@ -78,22 +78,23 @@ fn keep_apart(apart: &mut BTreeSet<[u32; 2]>, joint: &Joint) {
 }
 
 impl World {
-    /// Adds a joint; the handle stays valid until it is removed.
+    /// Adds a joint. The handle stays valid until the joint is removed.
     ///
-    /// Errors: a value out of its range, a handle of a body that was removed, a joint of a body to itself or between two that
-    /// cannot move, a solver that cannot hold joints.
+    /// Errors: a value out of range; the handle of a removed body; a joint from a body to itself; two bodies
+    /// neither of which is dynamic; a solver without support for joints. The last two do not apply to
+    /// filters.
     pub fn add_joint(&mut self, joint: &Joint) -> Result<JointHandle, Error> {
         let joint = self.admit(joint)?;
         Ok(self.joints.add(joint))
     }
 
-    /// A joint with its frames, from now on between its bodies.
+    /// Checks a joint and prepares its bodies; returns the joint with its frames.
     fn admit(&mut self, joint: &Joint) -> Result<Joint, Error> {
         self.check_joint(joint)?;
         let joint = joint.placed(&self.bodies);
         joint.kind.check()?;
         for body in [joint.a.index(), joint.b.index()] {
-            // Arms turn with round bodies, too.
+            // The anchors of round bodies turn, too.
             self.bodies.round[body] = false;
         }
         self.traits.spins();
@@ -102,9 +103,9 @@ impl World {
         Ok(joint)
     }
 
-    /// Changes a joint: its bodies, its frames, its values. Impulses stay where the rows do.
+    /// Changes a joint: its bodies, frames and values. Impulses carry over row by row.
     ///
-    /// Errors: as [`Self::add_joint`]; a handle of a joint that was removed.
+    /// Errors: as [`Self::add_joint`]; the joint was removed.
     pub fn set_joint(&mut self, handle: JointHandle, joint: &Joint) -> Result<(), Error> {
         self.joint(handle)?;
         let joint = self.admit(joint)?;
@@ -121,7 +122,7 @@ impl World {
         Ok(())
     }
 
-    /// A joint, with its frames. Errors: it was removed.
+    /// The definition of a joint, with its frames. Errors: the joint was removed.
     pub fn joint(&self, handle: JointHandle) -> Result<&Joint, Error> {
         let index = handle.index();
         let is_same = self.joints.generation.get(index) == Some(&handle.generation);
@@ -129,7 +130,7 @@ impl World {
         joint.ok_or_else(|| Error::invalid(format!("joint {index}"), "was removed"))
     }
 
-    /// All joints.
+    /// All joints, with their handles.
     pub fn joints(&self) -> impl Iterator<Item = (JointHandle, &Joint)> {
         self.joints.joints.iter().zip(&self.joints.generation).enumerate().filter_map(
             |(i, (joint, &generation))| {
@@ -138,7 +139,7 @@ impl World {
         )
     }
 
-    /// Errors and load of a joint after the last step. Errors: it was removed.
+    /// Position errors and load of a joint after the last step. Errors: the joint was removed.
     pub fn joint_state(&self, handle: JointHandle) -> Result<JointState, Error> {
         let joint = self.joint(handle)?;
         let ends = [joint.a.index(), joint.b.index()];
@@ -161,17 +162,17 @@ impl World {
         Ok(state)
     }
 
-    /// Impulses of a joint in the last step, with `Settings::record_impulses`; none without, or if the joint came
-    /// since. Errors: it was removed.
+    /// Impulses of a joint in the last step, with `Settings::record_impulses`; `None` without it, or if the
+    /// joint was added since. Errors: the joint was removed.
     pub fn joint_impulses(&self, handle: JointHandle) -> Result<Option<Booked>, Error> {
         self.joint(handle)?;
         let place = self.joints.places[handle.index()];
         Ok(place.and_then(|[group, i]| self.work.types[group as usize].kind.booked(i as usize)))
     }
 
-    /// Blocks of all joints in the coming step, if it were one of `h` (s) without substeps, with the impulses that a warm
-    /// start would give them. Those of a joint follow each other, in the order in which they are solved; the number is that
-    /// of the joint in this order. Call [`World::find_contacts`] first.
+    /// Blocks of all joints in the next step, as if it were a single step of `h` (s) without substeps, with
+    /// their warm-start impulses. Each block comes with the number of its joint in solving order; the blocks
+    /// of a joint are consecutive. Call [`World::find_contacts`] first.
     pub fn coming_blocks(&self, h: f32) -> Vec<(usize, RowBlock)> {
         let bodies = &self.bodies;
         let row = |i: usize| BodyRow {
@@ -201,7 +202,7 @@ impl World {
         blocks
     }
 
-    /// Blocks of all joints as bodies were after the last step, in the order in which they are solved.
+    /// Blocks of all joints at the state after the last step, in the order in which they are solved.
     pub fn solved_blocks(&self) -> Vec<SolvedBlock> {
         let work = &self.work;
         let mut names = vec![Vec::new(); work.types.len()];
@@ -233,7 +234,8 @@ impl World {
         solved
     }
 
-    /// Whether a joint keeps two bodies from colliding; one that was removed or changed still does until the next step.
+    /// Whether a joint keeps two bodies from colliding. A removed or changed joint still does until the next
+    /// step.
     pub fn keeps_apart(&self, a: usize, b: usize) -> bool {
         self.joints.keeps_apart([a as u32, b as u32])
     }
@@ -256,12 +258,12 @@ impl World {
         Ok(())
     }
 
-    /// Constraints of types of the caller's own.
+    /// Constraints of the caller's own types.
     pub(super) fn own_types(&self) -> &[Joined] {
         &self.work.types[..self.work.types.len() - self.joints.groups]
     }
 
-    /// Adds constraints of a type of the caller's own; groups of joints come after them.
+    /// Adds constraints of one of the caller's own types, before the groups of joints.
     pub(super) fn add_type(&mut self, kind: Box<dyn ConstraintType>) {
         let place = self.own_types().len();
         self.work.types.insert(place, Joined::new(kind));
@@ -285,7 +287,7 @@ impl World {
         (self.joints.stale, self.lanes_are_for, self.pairs_are_stale) = (true, None, true);
     }
 
-    /// Sorts joints into groups of one type and form, which are solved in lanes.
+    /// Sorts joints into groups of one type and form, which lanes solve together.
     pub(super) fn group_joints(&mut self) {
         if !std::mem::take(&mut self.joints.stale) {
             return;
@@ -327,7 +329,7 @@ fn empty<T: Definition>(of: &T, swapped: bool, h: f32) -> Box<dyn ConstraintType
     Box::new(Joints::<T>::new(of.form(), swapped, h))
 }
 
-/// Adds a joint to its group; returns its place there.
+/// Adds a joint to its group; returns its index there.
 fn push<T: Definition>(
     group: &mut dyn Any,
     joint: &T,
@@ -341,7 +343,7 @@ fn push<T: Definition>(
     group.joints.len() as u32 - 1
 }
 
-/// Angle of b against a that counts as zero (rad).
+/// Angle of b relative to a that counts as zero (rad).
 fn reference(kind: &JointKind) -> f64 {
     match kind {
         JointKind::Revolute(joint) => joint.reference_angle,
@@ -352,7 +354,7 @@ fn reference(kind: &JointKind) -> f64 {
     }
 }
 
-/// Joints as they are saved: definitions by place, generations, and what rows keep.
+/// Serialized joints: definitions and generations by index, and the kept numbers of their rows.
 #[cfg(feature = "serde")]
 #[derive(Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct SavedJoints {
@@ -375,7 +377,7 @@ impl SavedJoints {
         SavedJoints { joints: joints.clone(), generation: generation.clone(), kept: kept.collect() }
     }
 
-    /// Errors: lists of other lengths, a body that is not there, a value out of its range.
+    /// Errors: lists of different lengths, a body that does not exist, a value out of range.
     pub fn check(&self, bodies: usize) -> Result<(), String> {
         let SavedJoints { joints, generation, kept } = self;
         if generation.len() != joints.len() || kept.len() != joints.len() {

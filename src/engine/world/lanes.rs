@@ -1,4 +1,4 @@
-//! Which contact goes to which lane.
+//! Assignment of contacts to lanes.
 
 use super::{Order, World};
 use crate::engine::bodies::BodyKind;
@@ -6,7 +6,8 @@ use crate::engine::constraints::step::assign::Sides;
 use crate::engine::constraints::{Features, OppositeKind};
 
 impl World {
-    /// Gives every contact its lane. The lanes of the last step hold while the set of contacts does.
+    /// Assigns every contact to a lane. The last step's lanes are reused while the set of contacts is the
+    /// same.
     pub(super) fn assign_lanes(&mut self, features: &Features) {
         let widths = [self.settings.narrowest, self.settings.width];
         let choice = Some((self.solver_is.name, widths, self.settings.order, *features));

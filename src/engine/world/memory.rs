@@ -1,10 +1,10 @@
-//! Memory that a world allocates, and the part that a step uses.
+//! Memory that a world allocates, and the part of it in use.
 
 use super::World;
 use crate::engine::lanes::held;
 use std::mem::size_of_val;
 
-/// Arrays of one purpose.
+/// Memory of the arrays with one purpose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Component {
     /// Name for tables.
@@ -15,7 +15,7 @@ pub struct Component {
     pub used: usize,
 }
 
-/// Memory of a [`World`] on the heap, by purpose. The struct itself is not in it.
+/// Heap memory of a [`World`] by purpose, without the struct itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Memory {
     /// Bodies, shapes, broad phase, candidates, contacts, coloring, records, rows.
@@ -23,12 +23,12 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// Bytes allocated by all.
+    /// Bytes allocated by all components.
     pub fn held(&self) -> usize {
         self.components.iter().map(|c| c.held).sum()
     }
 
-    /// Bytes in use by all.
+    /// Bytes in use by all components.
     pub fn used(&self) -> usize {
         self.components.iter().map(|c| c.used).sum()
     }
@@ -40,7 +40,7 @@ impl Memory {
     }
 }
 
-/// Held and used bytes of some arrays.
+/// Held and used bytes of each array.
 macro_rules! arrays {
     ($($array:expr),* $(,)?) => { [$((held(&$array), size_of_val($array.as_slice()))),*] };
 }
@@ -48,7 +48,7 @@ macro_rules! arrays {
 impl World {
     /// Memory of the world by purpose.
     ///
-    /// Where an array cannot be looked into, as in the broad phase, used is what is held.
+    /// If the length of an array is not accessible, as in the broad phase, `used` equals `held`.
     pub fn memory(&self) -> Memory {
         let component = |name, arrays: &[(usize, usize)]| Component {
             name,
@@ -77,7 +77,7 @@ impl World {
             component("records", &records),
             component("rows", &[arrays![w.rows][0], opaque(w.motion.held_bytes())]),
         ];
-        // Most solvers keep nothing of their own.
+        // Most solvers have no state of their own.
         let own = w.own_bytes() + self.solver.held_bytes();
         if own > 0 {
             components.push(component("solver", &[opaque(own)]));

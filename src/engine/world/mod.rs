@@ -1,4 +1,4 @@
-//! One time step of the whole pipeline, every phase timed.
+//! The world, and its time step through the whole pipeline with every phase timed.
 //!
 //! ```text
 //! bounds → pairs → manifolds → colors → records → solver stages → impulses, poses
@@ -50,7 +50,7 @@ pub use memory::{Component, Memory};
 pub use queries::{Queries, RayHit};
 pub use settings::{Order, Settings};
 
-/// Properties of a shape for its contacts.
+/// Contact properties of a shape.
 #[derive(Clone, Copy, Debug, Default)]
 struct Surface {
     friction: f32,
@@ -59,15 +59,15 @@ struct Surface {
     reach: f32,
     /// [`Shape::min_half_extent`] (m).
     half_width: f32,
-    /// Its index in the narrow phase.
+    /// Kind of shape that the narrow phase distinguishes.
     class: Class,
-    /// What the narrow phase calls it.
+    /// Index of the shape in the narrow phase.
     number: u32,
 }
 
-/// Bodies, shapes, contacts and the settings that move them.
+/// A simulated world: bodies, shapes, contacts, joints and settings.
 ///
-/// A clone continues with the same bits; a watch on iterations is not copied.
+/// A clone continues bit-identically. A `watch` on iterations is not cloned.
 ///
 /// ```
 /// # use simpulse_engine as simpulse;
@@ -107,11 +107,11 @@ pub struct World {
     pub contacts: Vec<Contact>,
     /// Settings of the run.
     pub settings: Settings,
-    /// Times of the last step.
+    /// Phase times of the last step, with [`Settings::timed`].
     pub timings: Timings,
     /// Counts of the last step.
     pub counts: StepCounts,
-    /// Steps taken.
+    /// Number of steps taken.
     pub step_index: u64,
     traits: Traits,
     features: Features,
@@ -124,18 +124,18 @@ pub struct World {
     narrow: Narrow,
     assignment: Assignment,
     continuous: Continuous,
-    /// Bodies came or went since `continuous` took them in.
+    /// Whether bodies were added or removed since `continuous` was built.
     continuous_is_stale: bool,
-    /// The features that the present lanes were assigned for.
+    /// Solver, widths, order and features that the current lanes were assigned for.
     lanes_are_for: Option<(&'static str, [LaneWidth; 2], Order, Features)>,
-    /// Substep that the impulses of `contacts` belong to (s); none before there are any.
+    /// Length of the substep that the impulses of `contacts` belong to (s); `None` before the first step.
     impulses_of: Option<f32>,
-    /// The solver at work, and what it is one of.
+    /// The active solver, and the variant that created it.
     solver: Box<dyn Solver>,
     solver_is: &'static Variant,
     work: Workspace,
     slots: Slots,
-    /// State to restore before the next step.
+    /// Persistent forces to restore before the next step.
     applied: Vec<StandingForces>,
     events: Events,
     joints: JointSlots,
@@ -189,12 +189,12 @@ impl World {
         }
     }
 
-    /// Features that the scene's constraints need.
+    /// Kernel features that the scene's constraints need.
     pub fn features(&self) -> Features {
         self.features
     }
 
-    /// Advances by `settings.dt`.
+    /// Advances the world by `settings.dt`. Errors: a body diverged.
     pub fn step(&mut self) -> Result<(), Divergence> {
         let mut clock = Clock::start(self.settings.timed);
         self.solve(&mut clock);
@@ -264,15 +264,15 @@ impl World {
         self.timings = clock.stop();
     }
 
-    /// Finds the contacts of the next step, with its warm-start impulses, without solving. The step then finds the
-    /// same contacts.
+    /// Finds the contacts of the next step, with their warm-start impulses, without solving. The next step
+    /// then finds the same contacts.
     pub fn find_contacts(&mut self) {
         self.group_joints();
         self.update_pairs();
         self.update_contacts();
     }
 
-    /// The rule of the last step's last velocity sweep: none without one, or without
+    /// The rule of the last velocity sweep in the last step; `None` if there was no sweep, or without
     /// `Settings::observe_rule`.
     #[doc(hidden)]
     pub fn observed_rule(&self) -> Option<&ObservedRule> {
@@ -285,7 +285,7 @@ impl World {
         &mut self.work
     }
 
-    /// A step up to the new velocities and displacements in the rows.
+    /// Runs a step up to the new velocities and displacements in the rows.
     fn solve(&mut self, clock: &mut Clock) {
         self.group_joints();
         self.update_pairs();
@@ -325,7 +325,7 @@ impl World {
         types.iter_mut().for_each(|joined| joined.kind.begin(&self.bodies, h));
     }
 
-    /// The solver's stages, on rows and lanes that are ready.
+    /// Runs the solver's stages on the prepared rows and lanes.
     fn run_solver(&mut self, clock: &mut Clock, phases: PhaseFilter) -> WorkCount {
         let (s, width) = (&self.settings, self.lane_width());
         let input = StepInput {
@@ -344,7 +344,7 @@ impl World {
         solvers::run(self.solver.as_mut(), &mut self.work, &mut self.contacts, clock, &input, width)
     }
 
-    /// Lanes per instruction of the last step: as many as the settings allow and the colors fill.
+    /// Number of lanes per instruction in the last step: as many as the settings allow and the colors fill.
     pub fn lane_width(&self) -> LaneWidth {
         LaneWidth::from_lanes(self.work.lanes.width()).unwrap_or(LaneWidth::W1)
     }
@@ -358,17 +358,17 @@ impl World {
         features
     }
 
-    /// Returns the first body that diverged.
+    /// Returns the first diverged body as an error, if there is one.
     fn check(&self) -> Result<(), Divergence> {
         let b = &self.bodies;
-        // Cut to one length and without branches, so that the compiler does it in lanes.
+        // Slices of one length and no branches, so that the compiler vectorizes the loop.
         let arrays = [&b.velocity_x, &b.velocity_y, &b.angular_velocity, &b.position_x, &b.position_y];
         let [vx, vy, w, x, y] = arrays.map(|array| &array[..b.len()]);
         let [cos, sin] = [&b.rotation_cos, &b.rotation_sin].map(|array| &array[..b.len()]);
         let fastest = DIVERGED_SPEED * self.settings.length_unit;
         let bad = |i: usize| {
-            // NaN is bad, too. A spin that was out of bounds within the step, and is not any more,
-            // leaves one in the rotation.
+            // NaN is bad, too. A spin that was out of bounds only within the step leaves a NaN in the
+            // rotation.
             !((vx[i] * vx[i] + vy[i] * vy[i] <= fastest * fastest)
                 & (w[i].abs() <= DIVERGED_SPEED)
                 & ((x[i] + y[i]).abs() < f32::INFINITY)
@@ -407,7 +407,7 @@ impl World {
         ];
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
         for value in arrays.into_iter().flat_map(|array| array.iter()) {
-            // What is no number has any sign, as a build has it.
+            // The sign of a NaN depends on the build, so all NaNs hash alike.
             let bits = if value.is_nan() { f32::NAN } else { *value }.to_bits();
             hash = (hash ^ u64::from(bits)).wrapping_mul(0x0000_0100_0000_01b3);
         }

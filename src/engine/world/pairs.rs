@@ -3,7 +3,7 @@
 use super::World;
 
 impl World {
-    /// Renews the bounds of shapes that left theirs; if any did, brings the pairs up to date.
+    /// Updates the bounds of shapes that left theirs; if any did, updates the pairs.
     pub(super) fn update_pairs(&mut self) {
         let World { bodies, proxies, pairs, settings, .. } = self;
         let moved = self.fat_boxes.update(bodies, [settings.dt, settings.length_unit], proxies);

@@ -2,10 +2,11 @@
 //!
 //! The tree of the broad phase finds shapes nearby; their distances are computed in `f64` ([`distance`]).
 //!
-//! **Rays.** At a point p of the ray let d be the distance of the shape and n the direction to its nearest point. All of
-//! the shape lies behind the plane at distance d with normal n. So the ray may advance to that plane, by d / (n·u) along
-//! its direction u, and if n·u ≤ 0 it misses. For a polygon this ends after a few faces; for round shapes it is Newton's
-//! method on a convex function, from the side where it converges. Source: `vandenbergen2004`.
+//! **Rays.** At a point p of the ray, let d be the distance to the shape and n the direction to its nearest
+//! point. The whole shape lies behind the plane at distance d with normal n. The ray may therefore advance to
+//! that plane, by d / (n·u) along its direction u; if n·u ≤ 0, it misses. For a polygon this ends after a few
+//! faces. For round shapes it is Newton's method on a convex function, from the side where it converges.
+//! Source: `vandenbergen2004`.
 
 use super::World;
 use crate::engine::bodies::BodyHandle;
@@ -23,31 +24,32 @@ pub struct RayHit {
     pub body: BodyHandle,
     /// Index of the shape in [`World::shapes`].
     pub shape: usize,
-    /// Where (m).
+    /// Hit point (m).
     pub point: [f64; 2],
-    /// Unit vector out of the shape; against the ray if that begins inside.
+    /// Outward unit normal of the shape; opposite to the ray if the ray starts inside.
     pub normal: Vec2,
-    /// From the start of the ray (m); 0 if that is inside.
+    /// Distance from the start of the ray (m); 0 if the ray starts inside.
     pub distance: f64,
 }
 
 /// Distances below this (m) count as touching.
 const TOUCH: f64 = 1e-9;
 
-/// Advances of a ray along one shape: it has at most eight faces, and Newton's method needs few.
+/// Maximum advances of a ray toward one shape: a polygon has at most eight faces, and Newton's method needs
+/// few.
 const MOST_ADVANCES: u32 = 64;
 
-/// Bounds are read in `f32`: what lies this far outside of a query, relative to its coordinates, is still looked at.
+/// Bounds are `f32`: a query's region is enlarged by this fraction of its coordinates.
 const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
-/// Queries on the present positions. [`World::queries`] updates the tree once for many queries.
+/// Queries on the current positions. [`World::queries`] updates the tree once for many queries.
 #[derive(Debug)]
 pub struct Queries<'w> {
     world: &'w World,
 }
 
 impl World {
-    /// Queries on the present positions. They do not change the bits of later steps.
+    /// Prepares queries on the current positions. They do not change the bits of later steps.
     ///
     /// ```
     /// # use simpulse_engine as simpulse;
@@ -70,19 +72,21 @@ impl World {
         Queries { world: self }
     }
 
-    /// [`Queries::ray_cast`]
+    /// One ray cast, see [`Queries::ray_cast`].
     pub fn ray_cast(&mut self, from: [f64; 2], direction: [f64; 2]) -> Result<Option<RayHit>, Error> {
         self.queries().ray_cast(from, direction)
     }
 }
 
 impl Queries<'_> {
-    /// The first shape along an infinite ray. Errors: a value that is not finite, a direction of length zero.
+    /// The first shape that an infinite ray hits. Errors: a value that is not finite, a direction of length
+    /// zero.
     pub fn ray_cast(&self, from: [f64; 2], direction: [f64; 2]) -> Result<Option<RayHit>, Error> {
         self.ray_cast_where(from, direction, f64::INFINITY, |_| true)
     }
 
-    /// The first shape within `reach` (m) along a ray, of bodies that pass `filter`. Errors: as [`Self::ray_cast`].
+    /// The first shape within `reach` (m) along a ray, among bodies that pass `filter`. Errors: as
+    /// [`Self::ray_cast`].
     pub fn ray_cast_where(
         &self,
         from: [f64; 2],
@@ -101,7 +105,7 @@ impl Queries<'_> {
         self.visit(&mut region, |region, shape, body| {
             let limit = best.map_or(reach, |hit| hit.distance);
             let Some((distance, normal)) = self.advance(shape, origin, along, limit) else { return };
-            // Of two at one distance the lower index, whatever the order of the tree.
+            // At equal distances the lower index counts, whatever the order of the tree.
             let is_better = best.is_none_or(|hit| (distance, shape) < (hit.distance, hit.shape));
             if is_better && filter(body) {
                 let point = (origin + distance * along).to_array();
@@ -118,7 +122,7 @@ impl Queries<'_> {
         self.near(&Shape::Circle { center: Vec2::ZERO, radius: 0.0 }, DVec2::from(point), Vec2::ZERO)
     }
 
-    /// Bodies with a shape that shares a point with a box from corner `min` to corner `max` (m), ascending.
+    /// Bodies with a shape that touches the box from corner `min` to corner `max` (m), ascending.
     ///
     /// Errors: a value that is not finite, a corner `max` that is not above and to the right of `min`.
     pub fn bodies_in(&self, min: [f64; 2], max: [f64; 2]) -> Result<Vec<BodyHandle>, Error> {
@@ -129,7 +133,7 @@ impl Queries<'_> {
         self.near(&shape, 0.5 * (DVec2::from(min) + DVec2::from(max)), half.as_vec2())
     }
 
-    /// Bodies that share a point with a shape at `center`, whose bounds reach `half` from there.
+    /// Bodies that touch a shape at `center` whose bounds extend `half` from there.
     fn near(&self, shape: &Shape, center: DVec2, half: Vec2) -> Result<Vec<BodyHandle>, Error> {
         let at = center.as_vec2();
         let margin = ROUNDING * (at.abs() + half).max_element();
@@ -145,7 +149,7 @@ impl Queries<'_> {
         Ok(found)
     }
 
-    /// Calls `visit` with shapes whose bounds meet the region, and their bodies.
+    /// Calls `visit` with each shape whose bounds overlap the region, and with its body.
     fn visit(&self, region: &mut Region, mut visit: impl FnMut(&mut Region, usize, BodyHandle)) {
         let World { broadphase, proxies, .. } = self.world;
         broadphase.visit(proxies, region, |region, shape| {
@@ -155,12 +159,12 @@ impl Queries<'_> {
         });
     }
 
-    /// Distance (m) of shape `i` from `other` at `center`, less both radii, and the unit vector toward it; zero where
-    /// cores overlap.
+    /// Distance (m) of shape `i` from `other` at `center`, minus both radii, and the unit vector toward it; a
+    /// zero vector where the cores overlap.
     fn distance(&self, i: usize, other: &Shape, center: DVec2) -> (f64, DVec2) {
         let bodies = &self.world.bodies;
         let body = self.world.shape_body[i] as usize;
-        // From the query, so that nothing is lost far out.
+        // Relative to the query, so that no precision is lost far from the origin.
         let offset = (DVec2::from(bodies.center(body)) - center).as_vec2();
         let pose = Pose { position: offset, ..bodies.pose(body) };
         let shape = &self.world.shapes[i];
@@ -168,7 +172,7 @@ impl Queries<'_> {
         (found.distance - f64::from(shape.radius()) - f64::from(other.radius()), found.normal)
     }
 
-    /// Where a ray meets shape `i`, if within `limit`: distance (m) and outward normal.
+    /// The first point of shape `i` along a ray, if within `limit`: distance (m) and outward normal.
     fn advance(&self, i: usize, origin: DVec2, along: DVec2, limit: f64) -> Option<(f64, DVec2)> {
         let point = Shape::Circle { center: Vec2::ZERO, radius: 0.0 };
         let (mut at, mut normal) = (0.0, -along);

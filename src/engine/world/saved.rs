@@ -1,7 +1,8 @@
-//! Serialization of a world: the state that a step starts from, without what a step recomputes.
+//! Serialization of a world: the state at the start of a step, without values that the step recomputes.
 //!
-//! Not in it: constraints of other types than contacts (saving them is an error), and state that a solver keeps in
-//! its own fields instead of per contact and body. Solvers without such fields continue with the same bits.
+//! Not saved: constraints of the caller's own types (a world with any is an error), and state that a solver
+//! keeps in its own fields instead of per contact and body. Solvers without such fields continue
+//! bit-identically.
 
 use super::edit::{Slots, StandingForces};
 use super::events::Events;
@@ -21,7 +22,7 @@ use crate::engine::solvers;
 use glam::Vec2;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// [`Settings`], with names and numbers for what is static.
+/// [`Settings`] with names and numbers instead of static references.
 #[derive(Serialize, Deserialize)]
 struct SavedSettings {
     solver: String,
@@ -34,7 +35,7 @@ struct SavedSettings {
     #[serde(default = "one")]
     length_unit: f32,
     parameters: Parameters,
-    /// Names of mechanisms that are left out.
+    /// Names of disabled mechanisms.
     #[serde(default)]
     without: Vec<String>,
     impacts: Impacts,
@@ -81,12 +82,12 @@ impl Serialize for Settings {
     }
 }
 
-/// A meter.
+/// Default length unit: one meter.
 fn one() -> f32 {
     1.0
 }
 
-/// Errors: a solver that is not in the table, a number of lanes that is none of 1, 4, 8 and 16.
+/// Errors: an unknown solver, a number of lanes other than 1, 4, 8 and 16.
 impl<'de> Deserialize<'de> for Settings {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let s = SavedSettings::deserialize(from)?;

@@ -14,9 +14,10 @@ use crate::engine::solvers::Variant;
 pub enum Order {
     /// One after the other, sorted by shape pair (width 1 only).
     Natural,
-    /// The natural one from its end (width 1 only).
+    /// The natural order reversed (width 1 only).
     Reversed,
-    /// One after the other, by a hash of the pair of shapes: contacts that stay keep their order (width 1 only).
+    /// One after the other, sorted by a hash of the shape pair: persisting contacts keep their order (width 1
+    /// only).
     Shuffled,
     /// Color by color.
     Colored,
@@ -60,30 +61,31 @@ impl Order {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// Row of [`crate::engine::solvers::VARIANTS`].
+    /// The solver: a row of [`crate::engine::solvers::VARIANTS`].
     pub solver: &'static Variant,
-    /// Lanes per instruction, at most.
+    /// Maximum number of lanes per instruction.
     pub width: LaneWidth,
-    /// Fewest lanes that the engine may fall back to when colors are small; see [`Self::exactly`]. Every width gives
-    /// the same bits.
+    /// Minimum number of lanes that the engine may fall back to when colors are small; see [`Self::exactly`].
+    /// Every width gives the same bits.
     pub narrowest: LaneWidth,
-    /// Constraint order.
+    /// Order in which constraints are solved.
     pub order: Order,
     /// Work per step.
     pub budget: Budget,
-    /// m/s²
+    /// Gravity (m/s²).
     pub gravity: [f32; 2],
-    /// Step (s).
+    /// Time step (s).
     pub dt: f32,
-    /// Size of typical bodies (m). Lengths and speeds of the engine's own, such as the slop and the push speed
-    /// ([`crate::engine::params`]), are for bodies of about a meter, and are multiplied by this, as are `parameters` in m
-    /// and m/s. So a scene moves in the same way at any scale.
+    /// Size of typical bodies (m). The engine's own lengths and speeds, such as the slop and the push speed
+    /// ([`crate::engine::params`]), are chosen for bodies of about a meter. They are multiplied by this, and
+    /// so are `parameters` in m and m/s. A scene therefore moves in the same way at any scale.
     pub length_unit: f32,
-    /// The solver's own parameters, see [`Variant::set`].
+    /// Values of the solver's own parameters, see [`Variant::set`].
     pub parameters: Parameters,
-    /// Mechanisms of the solver that are left out, see [`Variant::mechanism`].
+    /// Disabled mechanisms of the solver, see [`Variant::mechanism`].
     pub without: Without,
-    /// Where bodies hit each other.
+    /// How impacts are solved: by the solver's own law, by waves of impacts before the step, or without
+    /// bounce.
     pub impacts: Impacts,
     /// Sum impulses over the substeps into [`crate::engine::contacts::Contact::step_impulse`].
     pub record_impulses: bool,
@@ -97,9 +99,9 @@ pub struct Settings {
     pub broadphase: BroadPhaseKind,
     /// How velocities move bodies.
     pub integrator: Integrator,
-    /// How spins turn bodies.
+    /// How angular velocities rotate bodies.
     pub rotation: RotationUpdate,
-    /// Continuous collision: whether fast bodies are stopped at surfaces that they would pass through, see
+    /// Continuous collision: stop fast bodies at surfaces that they would otherwise pass through, see
     /// [`crate::engine::continuous`].
     pub continuous: bool,
     /// Extra kernel features to compile in, to measure their cost.
@@ -107,8 +109,8 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Standard settings of `solver`: its budget, the widest lanes that this build has instructions
-    /// for, colored, gravity (0, −10), 1/60 s.
+    /// Standard settings of `solver`: its budget, the widest lanes that this build has instructions for,
+    /// colored order, gravity (0, −10) m/s², a step of 1/60 s.
     pub fn new(solver: &'static Variant) -> Self {
         Settings {
             solver,
@@ -134,7 +136,7 @@ impl Settings {
         }
     }
 
-    /// With `width` lanes, whatever the scene.
+    /// Always uses `width` lanes, whatever the scene.
     pub fn exactly(self, width: LaneWidth) -> Self {
         Settings { width, narrowest: width, ..self }
     }
@@ -144,7 +146,7 @@ impl Settings {
         self.impacts.law(self.solver.impacts)
     }
 
-    /// The solver's parameters; those in m and m/s times the length unit.
+    /// The solver's parameters, with those in m and m/s multiplied by the length unit.
     pub(crate) fn scaled_parameters(&self) -> Parameters {
         let mut values = self.parameters;
         for (value, parameter) in values.iter_mut().zip(self.solver.parameters) {
@@ -153,7 +155,7 @@ impl Settings {
         values
     }
 
-    /// Substep (s).
+    /// Length of a substep (s).
     pub fn h(&self) -> f32 {
         self.dt / self.budget.substeps as f32
     }

@@ -4,7 +4,7 @@ use crate::engine::bodies::{BodyDef, BodyKind};
 use crate::engine::constraints::Features;
 use crate::engine::shapes::Shape;
 
-/// Bodies that have a property, and whether a dynamic one is among them.
+/// Number of bodies that have a property, and whether one of them is dynamic.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Having {
@@ -37,7 +37,7 @@ pub(super) struct Traits {
 }
 
 impl Traits {
-    /// Takes note of a body; `round` if it is made of discs about its center of mass.
+    /// Records a body; `round` if it consists of discs about its center of mass.
     pub fn add(&mut self, body: &BodyDef, round: bool) {
         let dynamic = body.kind == BodyKind::Dynamic;
         let any = |has: fn(&crate::engine::bodies::ShapeDef) -> bool| body.shapes.iter().any(has);
@@ -49,12 +49,12 @@ impl Traits {
         self.damped |= body.linear_damping as f32 > 0.0 || body.angular_damping as f32 > 0.0;
     }
 
-    /// Some body may now rotate that could not at the start.
+    /// Records that some body may rotate.
     pub fn spins(&mut self) {
         self.spins = true;
     }
 
-    /// Features of constraints between such bodies.
+    /// Features of constraints between the recorded bodies.
     pub fn features(&self) -> Features {
         Features {
             rotation: self.friction.pair() || self.spins || self.has_other_than_discs,

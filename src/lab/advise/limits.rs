@@ -3,7 +3,7 @@
 use crate::lab::metrics::Errors;
 use crate::lab::study::TruthError;
 
-/// Limits that a setting has to meet; none: no limit.
+/// Limits that a setting has to meet; `None` means no limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Limits {
     /// Penetration (m), see [`Errors::penetration`].
@@ -14,7 +14,7 @@ pub struct Limits {
     /// Distance to the reference value, in its unit.
     #[serde(rename = "reference")]
     pub truth: Option<f64>,
-    /// Contact-law residual, root mean square in weights of the lighter body (1).
+    /// Contact-law residual, root mean square, as a multiple of the lighter body's weight × step (1).
     pub residual: Option<f64>,
     /// Speed over the last second, where the scene has to rest (m/s).
     #[serde(rename = "rest_speed_m_s")]
@@ -22,8 +22,8 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// The largest error ÷ limit: up to 1 is within all limits. A reference value that was not reached is infinitely
-    /// far.
+    /// The largest error ÷ limit: all limits are met if it is at most 1. A reference value that was not
+    /// reached counts as infinitely far.
     pub fn of_errors(&self, errors: &Errors, truth: Option<&TruthError>) -> f64 {
         let distance = truth.and_then(|t| t.error).unwrap_or(f64::INFINITY);
         let pairs = [
@@ -35,13 +35,13 @@ impl Limits {
         pairs.into_iter().fold(0.0, |worst: f64, (value, limit)| worst.max(in_limits(value, limit)))
     }
 
-    /// The time (ns) in its limit.
+    /// Time (ns) ÷ its limit.
     pub fn of_time(&self, time_ns: f64) -> f64 {
         in_limits(time_ns, self.time_ns)
     }
 }
 
-/// value/limit, where nothing of a limit of nothing is nothing.
+/// value ÷ limit; 0 without a limit, and for a value of 0 even if the limit is 0.
 fn in_limits(value: f64, limit: Option<f64>) -> f64 {
     match limit {
         Some(limit) if value > 0.0 => value / limit,

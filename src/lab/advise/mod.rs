@@ -1,19 +1,19 @@
 //! Finds the cheapest setting that is good enough for a scene.
 //!
-//! A *setting* is a solver, a constraint order, a budget and, for solvers with soft contacts,
-//! their stiffness; the fastest lane width goes with it. The search
+//! A *setting* is a solver, a constraint order, a budget and, for solvers with soft contacts, their
+//! stiffness. It runs at its fastest lane width. The search
 //!
 //! 1. tries a grid in which every part of the budget is doubled, the least work first;
-//! 2. refines what is good enough: each part is lowered by bisection toward its half;
-//! 3. times the best few again, interleaved and several times, which decides.
+//! 2. refines the good-enough settings: each part is lowered by bisection toward its half;
+//! 3. times the best few again, interleaved and several times. These times decide.
 //!
 //! If a scene has to rest, a setting within the limits is [run for a minute](crate::lab::study::horizon) before it
 //! counts as good enough.
 //!
-//! Settings that cannot be cheaper than a known one are skipped: budgets that contain, in every part, a good-enough
-//! budget of the same solver, order and stiffness; or a budget of the same solver and order that took far longer than
-//! allowed, or than the fastest good-enough one. Errors need not fall when a budget grows, so a skipped setting may
-//! be more accurate, but not cheaper.
+//! Settings that cannot be cheaper than a known one are skipped. These are budgets that contain, in every
+//! part, a good-enough budget of the same solver, order and stiffness; or a budget of the same solver and
+//! order that took much longer than the limit or than the fastest good-enough setting. Errors need not fall
+//! when a budget grows, so a skipped setting may be more accurate, but not cheaper.
 
 pub mod limits;
 mod search;
@@ -39,19 +39,19 @@ use search::Search;
 /// The scene, the solvers and the time limit of a search.
 #[derive(Clone, Debug)]
 pub struct SearchPlan {
-    /// Name of the catalog with its size, or a `.json` file.
+    /// Name of a scene of the catalog with its size, or a `.json` file.
     pub scene: String,
-    /// Limits of a good-enough setting.
+    /// Limits that a good-enough setting meets.
     pub limits: Limits,
     /// Treatment of impacts.
     pub impacts: Impacts,
     /// Rows of [`crate::engine::solvers::VARIANTS`].
     pub solvers: Vec<&'static Variant>,
-    /// Lane widths of colored settings; with one lane there is natural order too.
+    /// Lane widths of colored settings. If one lane is among them, natural order is tried too.
     pub widths: Vec<LaneWidth>,
-    /// Steps of the runs that measure errors; where none, the scene's own.
+    /// Steps of the runs that measure errors; `None` for the scene's own.
     pub steps: Option<u32>,
-    /// Timing runs of the final timing.
+    /// Timing runs per setting in the final timing.
     pub repeats: u32,
     /// Random seed of scenes that have one, and of the order of timing runs.
     pub seed: u64,
@@ -59,30 +59,30 @@ pub struct SearchPlan {
     pub seconds: f64,
 }
 
-/// Steps of a trial's timing, and of the final timing.
+/// Steps per setting in a trial's timing, and in the final timing.
 const TRIAL_STEPS: u32 = 60;
 const RACE_STEPS: u32 = 200;
 
-/// Settings in the final timing; the best of every other solver is in it too.
+/// Settings in the final timing, not counting the best setting of every other solver.
 const FINALISTS: usize = 4;
 
 /// A solver, an order, a budget and parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct SearchSetting {
-    /// Row of the table of solvers.
+    /// The solver.
     pub solver: &'static Variant,
     /// Constraint order.
     pub order: Order,
     /// Work per step.
     pub budget: Budget,
-    /// The solver's own parameters.
+    /// Values of the solver's parameters.
     pub parameters: Parameters,
     /// Treatment of impacts.
     pub impacts: Impacts,
 }
 
 impl SearchSetting {
-    /// The settings of a world, at this width.
+    /// The settings of a world at this width.
     pub fn settings(&self, width: LaneWidth) -> Settings {
         Settings {
             order: self.order,
@@ -105,7 +105,7 @@ impl SearchSetting {
     }
 }
 
-/// A time and where it was reached.
+/// A time, and the lane width at which it was reached.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct FoundTime {
     /// Lanes per instruction.
@@ -119,40 +119,40 @@ pub struct FoundTime {
     /// The longest step (ns).
     #[serde(rename = "longest_step_ns")]
     pub worst_ns: f64,
-    /// Its spread (ns), see [`Sample::spread_ns`].
+    /// Spread of the steps (ns), see [`Sample::spread_ns`].
     pub spread_ns: f64,
 }
 
-/// A setting with what it costs and how wrong it is.
+/// A setting with its cost and errors.
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// The setting.
     pub setting: SearchSetting,
-    /// At the fastest width; none if the run failed.
+    /// Time at the fastest width; `None` if the run failed.
     pub time: Option<FoundTime>,
-    /// Blocks of the final timing at that width; none before it.
+    /// Sample of the final timing at that width; `None` before it.
     pub sample: Option<Sample>,
-    /// None if the run failed.
+    /// Errors of the run; `None` if it failed.
     pub errors: Option<Errors>,
-    /// Distance to what is known about the scene.
+    /// Distance to the scene's reference value.
     pub truth: Option<TruthError>,
-    /// Why there is no result.
+    /// Why the run failed.
     pub failure: Option<FailedAt>,
-    /// The first demand of the scene that was not met: no limit is kept by what fell.
+    /// The first demand of the scene that was not met. If there is one, no limit counts as met.
     pub broken: Option<Broken>,
     /// Result of the one-minute run, if the scene has to rest and the run itself was within the limits.
     pub later: Option<Later>,
-    /// The largest of errors and time in their limits: up to 1 is good enough.
+    /// The largest of errors and time, each ÷ its limit; at most 1 is good enough.
     pub excess: f64,
 }
 
 impl Trial {
-    /// Whether it keeps every limit.
+    /// Whether it meets every limit.
     pub fn is_good(&self) -> bool {
         self.excess <= 1.0
     }
 
-    /// Why it is not good, in words; none if it is.
+    /// Why it is not good enough, as text; `None` if it is.
     pub fn fails(&self, limits: &Limits) -> Option<String> {
         if self.is_good() {
             return None;
@@ -193,7 +193,7 @@ impl Trial {
         self.time.map_or(f64::INFINITY, |t| t.median_ns)
     }
 
-    /// Whether two trials of the final timing are alike as far as can be told.
+    /// Whether two trials of the final timing are too close to call.
     pub fn ties(&self, other: &Trial) -> bool {
         matches!((&self.sample, &other.sample), (Some(a), Some(b)) if compare(a, b).is_eq())
     }
@@ -202,19 +202,20 @@ impl Trial {
 /// Result of the search.
 #[derive(Clone, Debug)]
 pub struct Advice {
-    /// The settings of the final timing: those that are good enough, fastest first, then the
-    /// others, nearest first. The first one is the advice if it is good enough.
+    /// The settings of the final timing: first those that are good enough, fastest first, then the others,
+    /// nearest first. The first one is the advice if it is good enough.
     pub finalists: Vec<Trial>,
-    /// Faster than the best and not good enough: the slowest such setting of each solver, those first that fail
-    /// only later. Timed in the same rounds as the finalists.
+    /// Settings that are faster than the best one but not good enough: the slowest such setting of each
+    /// solver, first those that fail only in the one-minute run. They are timed in the same rounds as the
+    /// finalists.
     pub rejected: Vec<Trial>,
-    /// Everything that was tried, in that order, with the times of the trials.
+    /// Everything that was tried, in the order of the search, with the times of the trials.
     pub trials: Vec<Trial>,
-    /// Settings skipped because they cannot be cheaper.
+    /// Number of settings skipped because they cannot be cheaper.
     pub left_out: usize,
-    /// Whether the time limit was reached before the grid was done.
+    /// Whether the time limit was reached before the search was done.
     pub is_cut_short: bool,
-    /// Timing runs and steps of the final timing.
+    /// Rounds and steps of the final timing.
     pub timing: [u32; 2],
 }
 
@@ -224,20 +225,21 @@ impl Advice {
         self.finalists.first().filter(|t| t.is_good())
     }
 
-    /// The next one that is good enough.
+    /// The second-cheapest setting that is good enough.
     pub fn runner_up(&self) -> Option<&Trial> {
         self.finalists.get(1).filter(|t| t.is_good())
     }
 
-    /// The nearest setting that is not good enough.
+    /// The setting nearest to the limits, of those that are not good enough.
     pub fn nearest(&self) -> Option<&Trial> {
         self.finalists.iter().find(|t| !t.is_good())
     }
 }
 
-/// Searches and times.
+/// Searches, then times the best settings again.
 ///
-/// Errors: an unknown scene; a bound on the reference error of a scene that has none.
+/// Errors: an unknown scene; no solvers or lanes; zero steps or repeats; a limit on the distance to the
+/// reference value for a scene that has none.
 pub fn advise(plan: &SearchPlan, progress: &dyn Fn(Progress)) -> Result<Advice, Error> {
     for (name, missing) in [("solvers", plan.solvers.is_empty()), ("lanes", plan.widths.is_empty())] {
         if missing {
@@ -275,10 +277,11 @@ pub fn advise(plan: &SearchPlan, progress: &dyn Fn(Progress)) -> Result<Advice, 
     Ok(Advice { finalists, rejected, trials, left_out, is_cut_short, timing: [plan.repeats, steps] })
 }
 
-/// Trials are not timed side by side: what took so many times as long may be faster in the final timing.
+/// Trials are not timed interleaved, so a setting up to this factor slower may be faster in the final timing.
 const LIKELY_FASTER: f64 = 1.2;
 
-/// Not good enough in less than `time_ns`: the slowest such setting of each solver, those first that fail only later.
+/// Settings faster than `time_ns` that are not good enough: the slowest of each solver, first those that fail
+/// only in the one-minute run.
 fn insufficient(trials: &[Trial], time_ns: f64) -> Vec<Trial> {
     let mut faster: Vec<&Trial> = trials.iter().filter(|t| !t.is_good() && t.time_ns() < time_ns).collect();
     faster
@@ -292,8 +295,8 @@ fn insufficient(trials: &[Trial], time_ns: f64) -> Vec<Trial> {
     kept
 }
 
-/// The best few, and the best of every solver that is not among them. Where none is good, all
-/// of them are the nearest of their solver.
+/// The best few, and the best of every solver that is not among them. If none is good enough: the nearest
+/// setting of each solver.
 fn choose(trials: &[Trial]) -> Vec<Trial> {
     let mut ranked = trials.to_vec();
     rank(&mut ranked);
@@ -308,7 +311,7 @@ fn choose(trials: &[Trial]) -> Vec<Trial> {
     chosen
 }
 
-/// Good ones by time, then the others by how far they are over the limits.
+/// Sorts good-enough settings by time, then the others by how far they exceed the limits.
 fn rank(trials: &mut [Trial]) {
     let key = |t: &Trial| if t.is_good() { (false, t.time_ns()) } else { (true, t.excess) };
     trials.sort_by(|a, b| {
@@ -325,7 +328,7 @@ fn widths(plan: &SearchPlan, order: Order) -> Vec<LaneWidth> {
     }
 }
 
-/// Times all finalists at all widths side by side, and judges them by that.
+/// Times all finalists at all widths interleaved, and judges them by these times.
 fn race_again(
     plan: &SearchPlan,
     scene: &crate::lab::scenes::Scene,

@@ -1,4 +1,4 @@
-//! The grid, the bisection, and what can be left out.
+//! The grid, the bisection, and the rule for skipping settings.
 
 use super::{SearchPlan, SearchSetting, TRIAL_STEPS, Trial, excess, fastest, rank, widths};
 use crate::engine::params::Budget;
@@ -12,30 +12,30 @@ use crate::lab::study::search::parameters;
 use crate::lab::study::{FailedAt, Progress, observe, open_scene};
 use std::time::Instant;
 
-/// Most substeps, most sweeps per substep, and most sweeps of a kind per step of the grid.
+/// Limits of the grid: substeps, and sweeps of one kind per step.
 const MOST_SUBSTEPS: u32 = 32;
 const MOST_SWEEPS: u32 = 64;
 
-/// A budget has to be too slow by this factor before larger ones are left out: a scene that is
-/// solved badly moves more and touches more, so that a larger budget can be somewhat faster. On
-/// the pyramid of 40 rows, four substeps take nine tenths of the time of two.
+/// A budget must be too slow by this factor before larger ones are skipped. A badly solved scene moves more
+/// and has more contacts, so a larger budget can be somewhat faster: on the pyramid of 40 rows, four substeps
+/// take 0.9 times the time of two.
 const TOO_SLOW: f64 = 1.5;
 
-/// Good settings to refine.
+/// Number of good-enough settings to refine.
 const REFINED: usize = 4;
 
-/// A search under way.
+/// The state of a search.
 pub struct Search<'a> {
     plan: &'a SearchPlan,
     scene: &'a Scene,
     progress: &'a dyn Fn(Progress),
     start: Instant,
     total: usize,
-    /// Everything tried so far.
+    /// All trials so far.
     pub trials: Vec<Trial>,
-    /// Settings skipped because they can only cost more.
+    /// Number of settings skipped because they can only cost more.
     pub left_out: usize,
-    /// Whether the time was up before the grid was done.
+    /// Whether the time limit was reached before the search was done.
     pub is_cut_short: bool,
 }
 
@@ -48,7 +48,7 @@ fn from_parts([substeps, velocity_iterations, relax_iterations, position_iterati
     Budget { substeps, velocity_iterations, relax_iterations, position_iterations }
 }
 
-/// Whether `large` has at least as much of everything.
+/// Whether `large` is at least as large as `small` in every part.
 fn contains(large: &Budget, small: &Budget) -> bool {
     parts(large).iter().zip(parts(small)).all(|(l, s)| *l >= s)
 }
@@ -57,8 +57,8 @@ fn sweeps(b: &Budget) -> u32 {
     b.substeps * (b.velocity_iterations + b.relax_iterations + b.position_iterations)
 }
 
-/// Budgets of a solver with every part doubled from 1: velocity and position sweeps together,
-/// relaxing sweeps as in its standard budget.
+/// Budgets of a solver: powers of two of substeps and of velocity and position sweeps, which are equal;
+/// relaxing sweeps as in the standard budget.
 pub fn budgets(solver: &Variant) -> Vec<Budget> {
     let mut budgets = Vec::new();
     let doubled = |most: u32| (0..).map(|i| 1 << i).take_while(move |&n: &u32| n <= most);
@@ -81,7 +81,7 @@ pub fn budgets(solver: &Variant) -> Vec<Budget> {
 }
 
 impl<'a> Search<'a> {
-    /// Nothing tried yet; the clock runs.
+    /// A search without trials; its clock starts now.
     pub fn new(plan: &'a SearchPlan, scene: &'a Scene, progress: &'a dyn Fn(Progress)) -> Self {
         Search {
             plan,
@@ -95,7 +95,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The grid, the least work first, so that what is left out is known early.
+    /// Tries the grid, the least work first, so that skippable settings are recognized early.
     pub fn coarse(&mut self) -> Result<(), Error> {
         let orders: &[Order] = match self.plan.widths.iter().any(|w| w.lanes() == 1) {
             true => &[Order::Natural, Order::Colored],
@@ -122,14 +122,14 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Lowers each part of the best good settings, one after the other, by bisection.
+    /// Lowers each part of the best good-enough settings in turn, by bisection.
     pub fn refine(&mut self) -> Result<(), Error> {
         let mut good: Vec<Trial> = self.trials.iter().filter(|t| t.is_good()).cloned().collect();
         rank(&mut good);
         for trial in good.iter().take(REFINED) {
             let mut setting = trial.setting;
             for part in 0..4 {
-                // The grid knows the half; a part of 0 or 1 has nothing below it.
+                // The grid contains half of the part; a part of 0 or 1 cannot be lowered.
                 let (mut low, mut high) = (parts(&setting.budget)[part] / 2, parts(&setting.budget)[part]);
                 while high - low > 1 && low > 0 {
                     let middle = low + (high - low) / 2;
@@ -155,7 +155,7 @@ impl<'a> Search<'a> {
         self.trials.iter().find(|t| same(&t.setting, s) && t.setting.budget == s.budget)
     }
 
-    /// Tries a setting unless it is known or can be left out; says whether there is time for more.
+    /// Tries a setting unless it is already known or can be skipped. Returns whether time is left.
     fn consider(&mut self, setting: SearchSetting) -> Result<bool, Error> {
         if self.start.elapsed().as_secs_f64() > self.plan.seconds {
             self.is_cut_short = true;
@@ -176,7 +176,7 @@ impl<'a> Search<'a> {
         Ok(true)
     }
 
-    /// See the [module above](super).
+    /// Whether the setting can be skipped, see the [module above](super).
     fn can_only_cost_more(&self, s: &SearchSetting) -> bool {
         let fastest =
             self.trials.iter().filter(|t| t.is_good()).map(Trial::time_ns).fold(f64::INFINITY, f64::min);
@@ -225,7 +225,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Whether two settings differ in their budget at most.
+/// Whether two settings differ at most in their budget.
 fn same(a: &SearchSetting, b: &SearchSetting) -> bool {
     a.solver.name == b.solver.name && a.order == b.order && a.parameters == b.parameters
 }
@@ -252,14 +252,14 @@ mod tests {
             assert!(grid.iter().all(|b| crate::lab::study::budget::check(b, variant).is_ok()));
             assert!(grid.iter().all(|b| b.substeps.is_power_of_two()));
         }
-        // 1 to 64 sweeps in 1 substep, 1 to 32 in 2, … 1 and 2 in 32.
+        // 1 to 64 sweeps with 1 substep, 1 to 32 with 2, … 1 and 2 with 32.
         assert_eq!(budgets(find("pgs").unwrap()).len(), 7 + 6 + 5 + 4 + 3 + 2);
     }
 
     #[test]
     fn capped_stiffnesses_count_once() {
         let soft = find("soft_step").unwrap();
-        // The cap is an eighth of the substep rate: 7.5 Hz in 1/60 s, 60 in 1/480, 240 in 1/1920.
+        // The cap is an eighth of the substep rate: 7.5 Hz at 1/60 s, 60 at 1/480, 240 at 1/1920.
         let count = |rate: f32| parameters(soft, 1.0 / rate, |p| p.trials).len();
         assert_eq!([count(60.0), count(480.0), count(1920.0)], [1, 3, 4]);
         let pgs = find("pgs").unwrap();
@@ -297,10 +297,10 @@ mod tests {
         };
         search.trials = vec![known(8, 10.0, 2.0)];
         assert_eq!(asked(&search, 16), [false, false]);
-        // Good with 16 sweeps in 20 ns: 17 are left out, 15 are not; nor is the other order.
+        // Good with 16 sweeps in 20 ns: 17 are skipped, 15 are not, nor is the other order.
         search.trials.push(known(16, 20.0, 0.5));
         assert_eq!([asked(&search, 15), asked(&search, 17)], [[false, false], [true, false]]);
-        // Not good, but slower than one and a half times the fastest good one; or the limit.
+        // Not good, but slower than 1.5 times the fastest good one, or than 1.5 times the limit.
         search.trials = vec![known(8, 31.0, 2.0), known(64, 20.0, 0.5)];
         assert_eq!(asked(&search, 16), [true, false]);
         search.trials = vec![known(8, 76.0, 2.0)];
@@ -315,14 +315,14 @@ mod tests {
         let limits = Limits { penetration: Some(2e-3), ..Limits::default() };
         let plan = SearchPlan { scene: "stack:4".to_string(), steps: Some(60), ..plan(limits) };
         let mut search = Search::new(&plan, &scene, &|_| ());
-        // Known to be good, and so slow that no time leaves anything out.
+        // A good setting so slow that no time causes a skip.
         let mut known = trial(1e15, 0.5);
         known.setting.budget = from_parts([1, 64, 0, 0]);
         search.trials.push(known);
         search.refine().unwrap();
         let tried: Vec<(u32, bool)> =
             search.trials[1..].iter().map(|t| (t.setting.budget.velocity_iterations, t.is_good())).collect();
-        // 48 first, then toward the boundary between the largest bad and the least good one.
+        // 48 first, then toward the boundary between the largest bad and the smallest good one.
         assert_eq!((tried.len(), tried[0].0), (5, 48));
         let least_good = tried.iter().filter(|t| t.1).map(|t| t.0).min().unwrap_or(64);
         let most_bad = tried.iter().filter(|t| !t.1).map(|t| t.0).max().unwrap_or(32);

@@ -1,16 +1,19 @@
-//! Every solver against its source's method, written once more in `f64` and without lanes.
+//! Comparison of every solver with an independent implementation of its source's method, in `f64` and without
+//! lanes.
 //!
-//! Both run on the same frozen problems, in natural order, from the same start, with 1, 2, 3, … iterations of one step
-//! (solvers without substeps) or as many substeps of the problem's step (solvers with substeps). After each, velocities,
-//! places and impulses are compared. With Δ the difference and 0 the state without contacts, the distance is the largest of
+//! Both run on the same frozen problems, in natural order, from the same start: 1, 2, 3, … iterations of one
+//! step (solvers without substeps) or 1, 2, 3, … substeps, each as long as the problem's step (solvers with
+//! substeps). After each, velocities, positions and impulses are compared. With Δ the difference and index 0
+//! the state without contacts, the distance is the largest of
 //!
 //! ```text
 //! |Δv|_M / V      |Δx|_M / (t V)      max |Δλ| / L,      V = max(|v − v₀|_M, |v₀|_M), L = max(max |λ|, the problem's unit)
 //! ```
 //!
-//! over iterations and problems; t is the time that has passed. What a solver does otherwise than its source, the method in `f64` does, too; each such
-//! departure is taken back alone to measure by how much it departs. Problems are small, and move as piles do in the middle
-//! of a step that is not at rest: gaps and overlaps, one of them deep, loads that are half right.
+//! over iterations and problems, where t is the elapsed time. The method in `f64` also makes the solver's
+//! departures from its source. Each departure is undone alone, to measure how much it changes the result. The
+//! problems are small and resemble piles in the middle of a step that is not at rest: gaps and overlaps, one
+//! of them deep, and loads that are only roughly right.
 
 pub mod model;
 mod picture;
@@ -30,38 +33,38 @@ use schedules::Run;
 use serde::Serialize;
 use table::{Against, AgreementEntry};
 
-/// Iterations, or substeps, that are compared.
+/// Number of iterations or substeps that are compared.
 pub const COUNT: u32 = 10;
-/// Iterations after which a solver is at its solution.
+/// Iterations after which a solver has reached its solution.
 const MANY: u32 = 2000;
 
-/// A solver beside its source's method.
+/// A solver compared with its source's method.
 #[derive(Clone, Debug, Serialize)]
 pub struct Agreement {
     /// Name of the solver.
     pub solver: &'static str,
     /// Key of its source in `papers/README.md`.
     pub source: &'static str,
-    /// Best settings of the source.
+    /// Best settings, as the source recommends them.
     pub best: &'static str,
-    /// Settings here.
+    /// Settings of the solver.
     pub ours: String,
-    /// What is counted: iterations or substeps.
+    /// What is counted: `iterations` or `substeps`.
     pub unit: &'static str,
     /// Largest distance (1).
     pub apart: f64,
-    /// Largest distance that a test allows, and the reason where rounding is not all of it.
+    /// Largest distance that a test allows (1), and the reason if it is more than rounding.
     pub bound: f64,
     pub why: &'static str,
-    /// What departs from the source, and by how much (1).
+    /// Departures from the source, each with its effect (1).
     pub departures: Vec<Departure>,
     /// A curve for each problem.
     pub curves: Vec<AgreementCurve>,
-    /// The section of its docs, which a test compares.
+    /// The **Agreement** paragraph of its docs, which a test compares.
     pub docs: String,
 }
 
-/// What a solver does otherwise than its source.
+/// A departure of a solver from its source.
 #[derive(Clone, Debug, Serialize)]
 pub struct Departure {
     pub what: &'static str,
@@ -73,24 +76,24 @@ pub struct Departure {
 #[derive(Clone, Debug, Serialize)]
 pub struct AgreementCurve {
     pub problem: String,
-    /// Iterations or substeps.
+    /// Numbers of iterations or substeps.
     pub counts: Vec<u32>,
-    /// Of the solver (1).
+    /// Residuals of the solver (1).
     pub ours: Vec<f64>,
-    /// Of the method in `f64` (1).
+    /// Residuals of the method in `f64` (1).
     pub theirs: Vec<f64>,
-    /// Distance of states (1).
+    /// Distances of the states (1).
     pub apart: Vec<f64>,
 }
 
-/// Velocities, places and impulses.
+/// Velocities, positions and impulses.
 struct ModelState {
     v: Vec<Velocity>,
     x: Vec<Velocity>,
     l: Vec<DPair>,
 }
 
-/// A column of discs, a pyramid of boxes, and a box that is deep in the ground.
+/// A column of discs, a pyramid of boxes, and a box deep in the ground.
 fn problems() -> [ContactProblem; 3] {
     let mut deep = gallery::sliding_box();
     deep.contacts.iter_mut().for_each(|c| c.gap = -0.3);
@@ -101,7 +104,7 @@ fn problems() -> [ContactProblem; 3] {
         let depth = problem.contacts[0].gap;
         let mut shaken = gallery::shaken(problem.clone(), seed, 0.1);
         for (i, (c, before)) in shaken.contacts.iter_mut().zip(&problem.contacts).enumerate() {
-            // Points of a manifold have one friction.
+            // Points of a manifold share one friction coefficient.
             c.friction = before.friction;
             // From 11 mm of overlap to 5 mm of gap.
             c.gap = depth + 8.0 * c.gap;
@@ -143,7 +146,7 @@ pub fn agreement(variant: &'static Variant) -> Result<Agreement, Error> {
     for name in entry.without {
         without = without.and(variant.mechanism(name)?);
     }
-    // What solvers keep for themselves is nothing at first.
+    // Solvers with internal state start without any.
     let warm = variant.kept == KeptSize::NONE;
     let mut departs = vec![0.0_f64; entry.departs.len()];
     for problem in problems() {
@@ -165,7 +168,7 @@ pub fn agreement(variant: &'static Variant) -> Result<Agreement, Error> {
                 |s: &ModelState| natural_map(&problem, Target::Rigid, &s.v, &s.l) / problem.impulse_unit();
             ours.push(residual(&here));
             theirs.push(residual(&source));
-            // Multipliers of redundant contacts are not determined at the solution.
+            // At the solution, multipliers of redundant contacts are not determined.
             let here = ModelState {
                 l: if matches!(against, Against::Solution(_)) { source.l.clone() } else { here.l },
                 ..here
@@ -182,7 +185,7 @@ pub fn agreement(variant: &'static Variant) -> Result<Agreement, Error> {
     Ok(result)
 }
 
-/// Standard settings in words.
+/// Standard settings as text.
 fn settings(variant: &Variant) -> String {
     let (b, uses) = (&variant.budget, &variant.uses);
     let mut parts: Vec<String> = [
@@ -202,7 +205,7 @@ fn settings(variant: &Variant) -> String {
     parts.join(", ")
 }
 
-/// The larger of the two; what is not a number is larger.
+/// The larger of the two; NaN counts as larger.
 fn worse(a: f64, b: f64) -> f64 {
     if b > a || b.is_nan() { b } else { a }
 }
@@ -226,7 +229,8 @@ fn distance(problem: &ContactProblem, time: f64, one: &ModelState, other: &Model
 }
 
 impl Agreement {
-    /// The section of its docs: all of it follows from the table and from what is measured in `f64`.
+    /// The **Agreement** paragraph of the solver's docs. It follows from the table and the measurements in
+    /// `f64` alone.
     fn section(&self, without: &[&str]) -> String {
         let Agreement { solver, best, ours, bound, why, unit, .. } = self;
         let kind = if self.curves[0].counts.len() > 1 {
@@ -263,7 +267,7 @@ pub fn percent(distance: f64) -> String {
     }
 }
 
-/// All comparisons as a table, and what departs below it.
+/// All comparisons as a table, with the departures below it.
 pub fn text(all: &[Agreement]) -> String {
     let mut out = String::from(
         "Distance from the source's method in f64 (largest of velocities, places and impulses)\n\n",
@@ -284,7 +288,7 @@ pub fn text(all: &[Agreement]) -> String {
     out
 }
 
-/// All curves, a line per point.
+/// All curves, one line per point.
 pub fn csv(all: &[Agreement]) -> String {
     let mut out = String::from("solver,problem,unit,count,residual_ours,residual_f64,apart\n");
     for a in all {

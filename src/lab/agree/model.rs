@@ -1,120 +1,127 @@
-//! One frozen problem in `f64`, solved row by row as the sources write their methods: no lanes, no shared arithmetic.
+//! One frozen problem in `f64`, solved row by row as the sources describe their methods: no lanes, no code
+//! shared with the solvers.
 //!
-//! An impulse λ along a row J changes velocities by M⁻¹ Jᵀ λ; a row alone is satisfied by λ ← λ − (J v + b)/k, k = J M⁻¹ Jᵀ.
-//! Bodies move by x ← x + h v. The gap of a point whose anchor r has turned with its body by θ is
+//! An impulse λ along a row J changes velocities by M⁻¹ Jᵀ λ. A single row is satisfied by λ ← λ − (J v +
+//! b)/k, with k = J M⁻¹ Jᵀ. Bodies move by x ← x + h v. If the anchor r of a point has turned with its body
+//! by θ, the gap of the point is
 //!
 //! ```text
 //! s = s₀ + n·(x_b − x_a) + n·((R(θ_b) − 1) r_b) − n·((R(θ_a) − 1) r_a),   n·((R − 1) r) = sin θ (r × n) + (1 − cos θ)(r × t)
 //! ```
 //!
-//! since r = −(r × t) n + (r × n) t; its drift along t likewise has sin θ (r × t) − (1 − cos θ)(r × n).
+//! since r = −(r × t) n + (r × n) t. Likewise its drift along t contains sin θ (r × t) − (1 − cos θ)(r × n).
 
 use crate::lab::reference::problem::SideRows;
 use crate::lab::reference::{ContactProblem, DPair, Velocity};
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Rows of both sides of a contact point that are not static.
+/// Rows of a contact point, for each of its two bodies that is not static.
 pub type SidesOfPoint = Vec<(usize, SideRows)>;
 
-/// Bodies, impulses and time of a run.
+/// State of a run: bodies, impulses, substep.
 #[derive(Clone, Debug)]
 pub struct Model<'a> {
     /// The problem.
     pub problem: &'a ContactProblem,
-    /// Substep (s): the step of the problem.
+    /// Substep (s), equal to the problem's step.
     pub h: f64,
-    /// (1/kg, 1/kg, 1/(kg·m²)) of every body.
+    /// Inverse masses of every body (1/kg, 1/kg, 1/(kg·m²)).
     pub inverse: Vec<Velocity>,
-    /// What forces add in a substep (m/s, rad/s).
+    /// Change of velocity by forces in a substep (m/s, rad/s).
     pub gained: Vec<Velocity>,
     /// Velocities.
     pub v: Vec<Velocity>,
-    /// How far bodies have moved and turned (m, rad).
+    /// Displacement and rotation of bodies since the start (m, rad).
     pub x: Vec<Velocity>,
     /// Accumulated impulses (N·s).
     pub l: Vec<DPair>,
-    /// Points of each manifold, two at most.
+    /// Points of each manifold, at most two.
     pub manifolds: Vec<Range<usize>>,
 }
 
-/// How a normal row treats the gap s; `[between dynamic bodies, against others]` where both differ.
+/// How a normal row treats the gap s.
 #[derive(Clone, Copy, Debug)]
 pub enum ScalarRule {
-    /// A gap may close, overlap is left alone.
+    /// A gap may close; overlap is not corrected.
     Rigid,
-    /// As [`ScalarRule::Rigid`], and a gap counts as none: the rows of sources without speculative contacts.
+    /// As [`ScalarRule::Rigid`], but a gap counts as closed: the rows of sources without speculative
+    /// contacts.
     Closed,
     /// b = max(β (s + slop)/h, −cap) (`baumgarte1972`): β (1), slop (m), cap (m/s).
     Baumgarte(f64, f64, f64),
-    /// Springs (`catto2011`).
+    /// Soft contacts (`catto2011`).
     Soft(ScalarSpring),
-    /// As [`ScalarRule::Rigid`], and the share β of an overlap that is less than a limit (m) is pushed apart (`coumans2015`).
+    /// As [`ScalarRule::Rigid`], and the fraction β of an overlap smaller than a limit (m) is corrected
+    /// (`coumans2015`).
     Shallow(f64, f64),
-    /// The share β of an overlap beyond a limit (m); points that are less deep have no row.
+    /// Corrects the fraction β of an overlap larger than a limit (m); shallower points have no row.
     Deep(f64, f64),
-    /// v_n ≥ 0 at points within a slop (m); the others have no row.
+    /// v_n ≥ 0 at points with a gap below a slop (m); other points have no row.
     Touching(f64),
 }
 
-/// Springs of contacts.
+/// Parameters of soft contacts.
 #[derive(Clone, Copy, Debug)]
 pub struct ScalarSpring {
-    /// ω (rad/s) between dynamic bodies; twice that against others.
+    /// ω (rad/s) between dynamic bodies; twice that against other bodies.
     pub omega: f64,
     /// ζ (1)
     pub damping: f64,
-    /// Fastest push (m/s).
+    /// Push speed limit (m/s).
     pub cap: f64,
-    /// Whether the cap is on γ_m β s (`catto2024box2d`), or on β s (`catto2024solver2d`).
+    /// Whether the cap applies to γ_m β s (`catto2024box2d`) or to β s (`catto2024solver2d`).
     pub scaled: bool,
-    /// Whether a push that is cut off leaks as much less, so that a load is carried at any depth (`shim`).
+    /// Whether the leak of a capped push is reduced in the same proportion, so that a load is carried at any
+    /// depth (`shim`).
     pub carries: bool,
 }
 
 impl ScalarSpring {
-    /// Of `hertz` (Hz), at most `share` of the rate of substeps of `h` (s).
+    /// From a frequency of `hertz` (Hz), limited to `share` of the substep rate; `h` is the substep (s).
     pub fn new(hertz: f64, share: f64, damping: f64, cap: f64, h: f64) -> Self {
         ScalarSpring { omega: TAU * hertz.min(share / h), damping, cap, scaled: true, carries: false }
     }
 }
 
-/// Order of the rows of a manifold, and which are solved together.
+/// Order of the rows of a manifold, and which of them are solved together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RowOrder {
     /// All normal rows, then all friction rows.
     NormalsFirst,
-    /// Normal and friction of one point, then of the other.
+    /// Normal and friction row of one point, then of the other.
     PointByPoint,
     /// All friction rows, then all normal rows.
     FrictionFirst,
-    /// As [`RowOrder::FrictionFirst`], both normal rows at once; pairs with a determinant below this part of k₁₁ k₂₂ are not.
+    /// As [`RowOrder::FrictionFirst`], with both normal rows solved together unless their determinant is
+    /// below this fraction of k₁₁ k₂₂.
     BlockLast(f64),
-    /// As [`RowOrder::NormalsFirst`], both normal rows at once.
+    /// As [`RowOrder::NormalsFirst`], with both normal rows solved together; the number as in
+    /// [`RowOrder::BlockLast`].
     BlockFirst(f64),
-    /// Normal and friction row of a point at once, exactly.
+    /// Normal and friction row of a point solved together, exactly.
     Cone,
 }
 
-/// A velocity sweep.
+/// Parameters of a velocity sweep.
 #[derive(Clone, Copy, Debug)]
 pub struct ScalarSweep {
-    /// Of normal rows.
+    /// Rule of normal rows.
     pub rule: ScalarRule,
-    /// Their order.
+    /// Order of the rows.
     pub rows: RowOrder,
-    /// ω: factor on every increment.
+    /// ω, the relaxation factor of every increment.
     pub relax: f64,
     /// Whether friction rows are solved.
     pub friction: bool,
-    /// Whether arms turn with their bodies.
+    /// Whether lever arms turn with their bodies.
     pub turned: bool,
-    /// Points, and rows, last first.
+    /// Whether points and rows are solved in reverse order.
     pub reversed: bool,
 }
 
 impl ScalarSweep {
-    /// Normal rows first, on fixed arms.
+    /// A sweep with normal rows first, on fixed arms.
     pub fn new(rule: ScalarRule) -> Self {
         ScalarSweep {
             rule,
@@ -127,7 +134,7 @@ impl ScalarSweep {
     }
 }
 
-/// New impulse of a row: keep λ − m (scale v_n + push).
+/// New impulse of a row: keep · λ − m (scale · v_n + push).
 struct Line {
     push: f64,
     scale: f64,
@@ -135,7 +142,7 @@ struct Line {
 }
 
 impl<'a> Model<'a> {
-    /// The problem at its start, from its warm impulses or from none.
+    /// The problem at its start, with its warm-start impulses or with none.
     pub fn new(problem: &'a ContactProblem, warm: bool) -> Self {
         let mut manifolds: Vec<Range<usize>> = Vec::new();
         for (i, c) in problem.contacts.iter().enumerate() {
@@ -179,7 +186,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// Applies all impulses; on arms that have turned if asked for.
+    /// Applies all impulses; with `turned`, on arms that have turned with their bodies.
     pub fn warm_start(&mut self, turned: bool) {
         for i in 0..self.l.len() {
             let rows = self.rows(i, turned);
@@ -202,7 +209,7 @@ impl<'a> Model<'a> {
         rows.iter().map(|(b, j)| (0..3).map(|k| j[axis][k] * self.v[*b][k]).sum::<f64>()).sum()
     }
 
-    /// k = J₁ M⁻¹ J₂ᵀ of rows of two points of one manifold (1/kg).
+    /// k = J₁ M⁻¹ J₂ᵀ of two rows of one manifold (1/kg).
     pub fn coupling(&self, one: (&SidesOfPoint, usize), other: (&SidesOfPoint, usize)) -> f64 {
         let product = |((b, p), (_, q)): (&(usize, SideRows), &(usize, SideRows))| {
             (0..3).map(|k| self.inverse[*b][k] * p[one.1][k] * q[other.1][k]).sum::<f64>()
@@ -229,7 +236,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// Gap of point `i`, and how far it has drifted along t (m).
+    /// Gap of point `i`, and its drift along t (m).
     pub fn place(&self, i: usize) -> DPair {
         let mut place = [self.problem.contacts[i].gap, 0.0];
         for (b, [n, t]) in self.problem.contacts[i].sides() {
@@ -240,7 +247,7 @@ impl<'a> Model<'a> {
         place
     }
 
-    /// Whether one side of point `i` cannot be pushed.
+    /// Whether one side of point `i` is not dynamic.
     fn against_static(&self, i: usize) -> bool {
         let dynamic = |b: &Option<u32>| {
             b.is_some_and(|b| {
@@ -279,7 +286,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// c and s of a normal row: its impulse alone is max(0, c − s v_n).
+    /// c and s of a normal row: the impulse that solves the row alone is max(0, c − s v_n).
     fn normal_line(&self, i: usize, sweep: &ScalarSweep) -> DPair {
         let Line { push, scale, keep } = self.line(i, sweep.rule);
         let (m, old) = (self.mass(&self.rows(i, false), 0), self.l[i][0]);
@@ -287,7 +294,7 @@ impl<'a> Model<'a> {
         [old + sweep.relax * (c - old), sweep.relax * m * scale]
     }
 
-    /// Gives a row a new impulse.
+    /// Sets the impulse of a row and updates velocities.
     pub fn set(&mut self, i: usize, axis: usize, rows: &SidesOfPoint, new: f64) {
         let old = std::mem::replace(&mut self.l[i][axis], new);
         self.push(rows, axis, new - old);
@@ -307,7 +314,7 @@ impl<'a> Model<'a> {
         self.set(i, 1, &rows, new);
     }
 
-    /// The rows of one manifold.
+    /// Solves the rows of one manifold.
     pub fn contact(&mut self, m: Range<usize>, sweep: &ScalarSweep) {
         let mut points: Vec<usize> = m.collect();
         if sweep.reversed {
@@ -336,7 +343,8 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// Both normal rows: whichever of the four cases has no pull and no approach.
+    /// Solves both normal rows together: takes the one of four cases in which no impulse is negative and no
+    /// point approaches.
     fn block(&mut self, points: &[usize], sweep: &ScalarSweep, singular: f64) {
         let &[i, j] = points else { return self.normal_row(points[0], sweep) };
         let rows = [i, j].map(|i| self.rows(i, sweep.turned));
@@ -347,7 +355,7 @@ impl<'a> Model<'a> {
             return;
         }
         let [v1, v2] = [0, 1].map(|p| self.speed(&rows[p], 0));
-        // λ₁ + s₁ k λ₂ = q₁ and s₂ k λ₁ + λ₂ = q₂ where both push.
+        // If both impulses are positive: λ₁ + s₁ k λ₂ = q₁ and s₂ k λ₁ + λ₂ = q₂.
         let (q1, q2) = (c1 - s1 * (v1 - k * self.l[j][0]), c2 - s2 * (v2 - k * self.l[i][0]));
         let det = 1.0 - s1 * s2 * k * k;
         let cases = [[(q1 - s1 * k * q2) / det, (q2 - s2 * k * q1) / det], [q1, 0.0], [0.0, q2], [0.0, 0.0]];
@@ -360,14 +368,15 @@ impl<'a> Model<'a> {
         self.set(j, 0, &rows[1], b);
     }
 
-    /// Both rows of a point: whichever of open, sticking and slipping either way holds.
+    /// Solves both rows of a point together: takes the case that holds of open, sticking, and slipping in
+    /// either direction.
     fn cone(&mut self, i: usize, sweep: &ScalarSweep) {
         let rows = self.rows(i, false);
         let Line { push, .. } = self.line(i, sweep.rule);
         let (l, mu) = (self.l[i], self.problem.contacts[i].friction);
         let k = |a, b| self.coupling((&rows, a), (&rows, b));
         let (nn, nt, tt) = (k(0, 0), k(0, 1), k(1, 1));
-        // Velocities without any impulse at this point.
+        // Velocities without the impulse of this point.
         let n = self.speed(&rows, 0) + push - nn * l[0] - nt * l[1];
         let t = self.speed(&rows, 1) - nt * l[0] - tt * l[1];
         let det = nn * tt - nt * nt;
@@ -387,7 +396,7 @@ impl<'a> Model<'a> {
         (0..2).for_each(|axis| self.set(i, axis, &rows, new[axis]));
     }
 
-    /// Gauss–Seidel over the manifolds in this order.
+    /// Gauss–Seidel over the manifolds in the given order.
     pub fn sweep_in(&mut self, sweep: &ScalarSweep, order: impl Iterator<Item = usize>) {
         order.for_each(|m| self.contact(self.manifolds[m].clone(), sweep));
     }
@@ -397,9 +406,10 @@ impl<'a> Model<'a> {
         self.sweep_in(sweep, 0..self.manifolds.len());
     }
 
-    /// All manifolds from the same velocities. If bodies are `split`, each has as many copies as manifolds, of an equal part
-    /// of its mass each, and the copies' mean velocity in the end. `whole`: no row sees what another row of its
-    /// manifold does, either, and rows are counted instead of manifolds.
+    /// Solves all manifolds from the same velocities. With `split`, each body is split into as many copies as
+    /// it has manifolds, each with an equal part of its mass; its new velocity is the mean of the copies.
+    /// With `by_rows`, each row of a manifold is solved from the same velocities too, and rows are counted
+    /// instead of manifolds.
     pub fn jacobi(&mut self, sweep: &ScalarSweep, split: bool, by_rows: bool) {
         let mut copies = vec![0.0; self.v.len()];
         for m in &self.manifolds {
@@ -437,7 +447,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// Makes the impulses these; velocities follow.
+    /// Sets all impulses and updates velocities.
     pub fn jump(&mut self, to: &[DPair]) {
         for (i, &[n, t]) in to.iter().enumerate() {
             let rows = self.rows(i, false);
@@ -446,7 +456,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// b of every normal row under a rule without springs (m/s).
+    /// b of every normal row (m/s), under a rule without springs.
     pub fn bias(&self, rule: ScalarRule) -> Vec<f64> {
         (0..self.l.len()).map(|i| self.line(i, rule).push).collect()
     }
@@ -456,7 +466,8 @@ impl<'a> Model<'a> {
         self.problem.contact_velocities(&self.v)
     }
 
-    /// Nonlinear Gauss–Seidel on places: of an overlap beyond `slop` (m) the share `share` goes, `most` (m) at most.
+    /// Nonlinear Gauss–Seidel on positions: corrects the fraction `share` of an overlap beyond `slop` (m), by
+    /// at most `most` (m).
     pub fn positions(&mut self, share: f64, slop: f64, most: f64, turned: bool) {
         for i in 0..self.l.len() {
             let error = (share * (self.place(i)[0] + slop)).clamp(-most, 0.0);
@@ -465,8 +476,8 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// As [`Self::positions`] on turned arms, both points of a manifold at once (`catto2024solver2d`): C + K p ≥ 0 without
-    /// pull, by its four cases.
+    /// As [`Self::positions`] on turned arms, with both points of a manifold together (`catto2024solver2d`):
+    /// C + K p ≥ 0 with p ≥ 0, by its four cases.
     pub fn positions_in_pairs(&mut self, share: f64, slop: f64, most: f64) {
         for m in self.manifolds.clone() {
             let error = |model: &Self, i: usize| (share * (model.place(i)[0] + slop)).clamp(-most, 0.0);

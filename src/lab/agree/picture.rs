@@ -1,4 +1,5 @@
-//! `agree.svg`: a panel per solver and problem, the residual of the solver as dots on that of the method in `f64`.
+//! `agree.svg`: a panel per solver and problem. Dots are residuals of the solver, the line is that of the
+//! method in `f64`.
 
 use super::{Agreement, AgreementCurve};
 use crate::lab::error::Error;

@@ -1,5 +1,6 @@
-//! The methods as their sources write them, a function each. What a source has otherwise than the solver here is done its way
-//! where [`Run::undo`] names the place of that departure in the [table](super::table).
+//! The methods as described by their sources, a function each. They include the departures of the solver
+//! here, except the one with index [`Run::undo`] in the [table](super::table), which is done as the source
+//! does it.
 
 use super::model::{Model, RowOrder, ScalarRule, ScalarSpring, ScalarSweep};
 use crate::engine::params::Budget;
@@ -7,34 +8,34 @@ use crate::engine::solvers::{Variant, xpbd as positions};
 use crate::lab::reference::DPair;
 use crate::lab::reference::residual::project_cone;
 
-/// Overlap that is left alone (m), push cap (m/s), largest correction of a position sweep (m).
+/// Uncorrected overlap (m), push speed limit (m/s), largest correction of a position sweep (m).
 const SLOP: f64 = 0.005;
 const CAP: f64 = 3.0;
 const MOST: f64 = 0.2;
 
-/// What a schedule is asked for.
+/// Parameters of a schedule.
 #[derive(Clone, Copy, Debug)]
 pub struct Run {
-    /// The solver here.
+    /// The solver that is compared.
     pub variant: &'static Variant,
-    /// Its budget.
+    /// Budget of the run.
     pub budget: Budget,
-    /// Place of a departure that is left out.
+    /// Index of the departure to undo.
     pub undo: Option<usize>,
 }
 
 impl Run {
-    /// Default of a parameter of the solver; none where it has no such.
+    /// Default of a parameter of the solver; `None` if it has no such parameter.
     pub fn find(&self, name: &str) -> Option<f64> {
         self.variant.parameters.iter().find(|p| p.name == name).map(|p| f64::from(p.default))
     }
 
-    /// The same, zero where there is none.
+    /// The same; zero if the solver has no such parameter.
     fn get(&self, name: &str) -> f64 {
         self.find(name).unwrap_or(0.0)
     }
 
-    /// Whether departure `place` is left out.
+    /// Whether departure `place` is undone.
     fn undoes(&self, place: usize) -> bool {
         self.undo == Some(place)
     }
@@ -43,14 +44,14 @@ impl Run {
         ScalarRule::Baumgarte(self.get("baumgarte"), SLOP, CAP)
     }
 
-    /// Springs at most at this share of the rate of substeps.
+    /// Springs with a frequency of at most `share` of the substep rate.
     fn spring(&self, share: f64, h: f64) -> ScalarSpring {
         let damping = self.find("damping_ratio").unwrap_or(10.0);
         ScalarSpring::new(self.get("contact_hertz"), share, damping, self.get("push_speed"), h)
     }
 }
 
-/// Substeps: forces, warm start, `solve` in every iteration, motion, `after`.
+/// Runs the substeps: forces, warm start, `solve` in every iteration, motion, `after`.
 fn substeps(
     model: &mut Model,
     run: &Run,
@@ -67,18 +68,18 @@ fn substeps(
     }
 }
 
-/// Sweeps alone.
+/// Velocity sweeps only.
 fn sweeps(model: &mut Model, run: &Run, sweep: ScalarSweep) {
     substeps(model, run, false, |m| m.sweep(&sweep), |_| ());
 }
 
-/// Sweeps, and after motion those of a relaxing rule.
+/// Velocity sweeps and, after motion, relaxing sweeps.
 fn relaxed(model: &mut Model, run: &Run, sweep: ScalarSweep, relax: ScalarSweep) {
     let after = |m: &mut Model| (0..run.budget.relax_iterations).for_each(|_| m.sweep(&relax));
     substeps(model, run, sweep.turned, |m| m.sweep(&sweep), after);
 }
 
-/// Sweeps, and after motion position sweeps.
+/// Velocity sweeps and, after motion, position sweeps.
 fn placed(model: &mut Model, run: &Run, sweep: ScalarSweep, position: impl Fn(&mut Model)) {
     let after = |m: &mut Model| (0..run.budget.position_iterations).for_each(|_| position(m));
     substeps(model, run, sweep.turned, |m| m.sweep(&sweep), after);
@@ -95,7 +96,7 @@ pub(super) fn pgs(model: &mut Model, run: &Run) {
     sweeps(model, run, sweep);
 }
 
-/// Its source displaces bodies: that is [`xpbd`].
+/// Its source displaces bodies, as [`xpbd`] does.
 pub(super) fn pgs_substeps(model: &mut Model, run: &Run) {
     match run.undo {
         Some(_) => xpbd(
@@ -142,7 +143,7 @@ pub(super) fn local(model: &mut Model, run: &Run) {
     substeps(model, run, false, solve, |_| ());
 }
 
-/// Levels of bodies: contacts between them and the nearest thing that stands still.
+/// Level of each body: number of contacts between it and the nearest static body.
 fn levels(model: &Model) -> Vec<usize> {
     let mut level = vec![usize::MAX; model.v.len()];
     for next in 1.. {
@@ -229,7 +230,8 @@ pub(super) fn tgs_ngs(model: &mut Model, run: &Run) {
     placed(model, run, sweep, |m| m.positions(run.get("correction"), SLOP, MOST, true));
 }
 
-/// Springs at an eighth of the rate of substeps, or at a third of that of steps.
+/// Soft sweeps, then rigid relaxing sweeps. `share`: largest spring frequency, as a fraction of the substep
+/// rate.
 fn soft(model: &mut Model, run: &Run, share: f64, turned: bool) {
     let mut spring = run.spring(share, model.h);
     spring.scaled = !run.undoes(0);
@@ -269,7 +271,7 @@ pub(super) fn rapier(model: &mut Model, run: &Run) {
     relaxed(model, run, soft, ScalarSweep { rows, ..ScalarSweep::new(ScalarRule::Rigid) });
 }
 
-/// What is left of it without its statics, frames, impacts and jams.
+/// `shim` without its statics, frames, impacts and jams.
 pub(super) fn shim(model: &mut Model, run: &Run) {
     let rate = run.get("stiffness") / model.h;
     let spring = ScalarSpring {
@@ -337,7 +339,7 @@ pub(super) fn tgs_sticky(model: &mut Model, run: &Run) {
                 let wanted = m.l[i][1] - mass * (m.speed(&rows, 1) + back);
                 let new = wanted.clamp(-bound, bound);
                 m.set(i, 1, &rows, new);
-                // What slides begins to stick again where it is.
+                // A point that slides starts to stick again at its current position.
                 if wanted.abs() > bound && !run.undoes(3) {
                     drifts[i] = -drift;
                 }
@@ -428,7 +430,7 @@ pub(super) fn xpbd(model: &mut Model, run: &Run) {
         model.accelerate();
         let begin = model.x.clone();
         model.advance();
-        // λ of displacements (kg·m).
+        // λ as impulses × time, which displace bodies (kg·m).
         let mut l = vec![[0.0; 2]; model.l.len()];
         for _ in 0..run.budget.position_iterations {
             for range in model.manifolds.clone() {
@@ -436,7 +438,7 @@ pub(super) fn xpbd(model: &mut Model, run: &Run) {
                     let (rows, place) = (model.rows(i, true), model.place(i));
                     let change = if axis == 0 {
                         let error = place[0].clamp(-run.get("push_speed") * model.h, 0.0);
-                        // A point that does not touch takes nothing back where it is rigid.
+                        // Without compliance, a point that does not overlap gives back nothing.
                         let wanted = -(error + compliance * l[i][0]);
                         wanted / (1.0 / model.mass(&rows, 0) + compliance)
                     } else {
@@ -467,7 +469,7 @@ pub(super) fn xpbd(model: &mut Model, run: &Run) {
     }
 }
 
-/// Bodies in the order in which contacts name them.
+/// Bodies in the order in which the contacts list them.
 fn bodies_in_order(model: &Model) -> Vec<usize> {
     let mut order = Vec::new();
     for body in model.problem.contacts.iter().flat_map(|c| c.sides().map(|(b, _)| b)) {
@@ -478,20 +480,21 @@ fn bodies_in_order(model: &Model) -> Vec<usize> {
     order
 }
 
-/// From no multipliers and penalties of 1 N/m, as a first step has them.
+/// Starts with zero multipliers and penalties of 1 N/m, as in a first step.
 pub(super) fn avbd(model: &mut Model, run: &Run) {
     let (h, points, order) = (model.h, model.l.len(), bodies_in_order(model));
     let stabilizes = run.budget.position_iterations > 0;
     let (margin, alpha) = (5e-4, if stabilizes { 1.0 } else { run.get("alpha") });
     let keep = if stabilizes { 1.0 } else { run.get("alpha") * run.get("gamma") };
-    // λ (N) and k (N/m) of normal and friction rows, the force of the last iteration, velocities of the last substep.
+    // λ (N) and k (N/m) of normal and friction rows; velocities of the last substep.
     let (mut l, mut k) = (vec![[0.0; 2]; points], vec![[1.0; 2]; points]);
     let mut last: Vec<[f64; 3]> = vec![[0.0; 3]; model.v.len()];
     for _ in 0..run.budget.substeps {
         l.iter_mut().flatten().for_each(|l| *l *= keep);
         k.iter_mut().flatten().for_each(|k| *k = (*k * run.get("gamma")).clamp(1.0, 1e9));
         let begin = model.x.clone();
-        // Errors are linear in the motion from the start of the step; C₀ is that at the start of the substep.
+        // Errors are linear in the motion since the start of the step. C₀ is the error at the start of the
+        // substep.
         let linear = |m: &Model, i: usize| {
             let mut c = [m.problem.contacts[i].gap + margin, 0.0];
             for (b, j) in m.rows(i, false) {
@@ -517,7 +520,7 @@ pub(super) fn avbd(model: &mut Model, run: &Run) {
         }
         let forces = |m: &Model, i: usize, alpha: f64, l: &[DPair], k: &[DPair]| {
             let c = linear(m, i);
-            // Gaps have no error to leave alone.
+            // A gap has no error to keep.
             let old = [if first[i][0] - margin > 0.0 { 0.0 } else { first[i][0] }, 0.0];
             let c = [c[0] - alpha * old[0], c[1] - first[i][1]];
             let normal = (l[i][0] - k[i][0] * c[0]).max(0.0);
@@ -530,7 +533,7 @@ pub(super) fn avbd(model: &mut Model, run: &Run) {
                 let mut f = [0.0; 3];
                 for c in 0..3 {
                     let inertia = 1.0 / (m.inverse[body][c] * h * h);
-                    // What does not turn has infinite inertia.
+                    // Infinite inertia if the body does not turn.
                     (a[c][c], f[c]) = match inertia.is_finite() {
                         true => (inertia, inertia * (inertial[body][c] - m.x[body][c])),
                         false => (1.0, 0.0),
@@ -624,7 +627,7 @@ pub(super) fn anderson(model: &mut Model, run: &Run) {
     let (count, depth) = (run.budget.velocity_iterations, run.get("depth") as usize);
     model.accelerate();
     model.warm_start(false);
-    // f and g of the sweeps since the last start.
+    // f and g of the sweeps since the last restart.
     let mut seen: Vec<[Vec<DPair>; 2]> = Vec::new();
     for k in 0..count {
         let before = model.l.clone();
@@ -694,7 +697,7 @@ impl VectorLaw {
         l.iter().zip(&self.friction).map(|(&l, &mu)| project_cone(mu, l)).collect()
     }
 
-    /// Every pair times a number of its own.
+    /// Every pair, scaled by a function of its effective mass.
     fn scaled(&self, l: &[DPair], by: impl Fn(f64) -> f64) -> Vec<DPair> {
         l.iter().zip(&self.mass).map(|(l, &m)| l.map(|l| by(m) * l)).collect()
     }
@@ -743,8 +746,8 @@ pub(super) fn apgd(model: &mut Model, run: &Run) {
     model.advance();
 }
 
-/// The solution of the convex relaxation of soft contacts: least ½ γᵀ (J M⁻¹ Jᵀ + R) γ + γᵀ (J v − v̂) within the cones, point by
-/// point.
+/// The solution of the convex relaxation of soft contacts: the minimum of ½ γᵀ (J M⁻¹ Jᵀ + R) γ +
+/// γᵀ (J v − v̂) within the cones, found point by point.
 pub(super) fn sap(model: &mut Model, run: &Run) {
     model.accelerate();
     model.warm_start(false);
@@ -775,7 +778,7 @@ pub(super) fn sap(model: &mut Model, run: &Run) {
     model.advance();
 }
 
-/// The solution of the law of [`pgs`], which Gauss–Seidel approaches.
+/// The solution of the law of [`pgs`], to which Gauss–Seidel converges.
 pub(super) fn solution(model: &mut Model, run: &Run) {
     let budget = Budget { velocity_iterations: 5000, ..run.budget };
     pgs(model, &Run { budget, undo: None, ..*run });

@@ -1,14 +1,14 @@
-//! What every solver is compared with: an entry for each.
+//! The reference of every solver in this comparison: a table with an entry each.
 
 use super::model::Model;
 use super::schedules::{self as by, Run};
 
-/// What a solver is compared with.
+/// The reference of a comparison.
 #[derive(Clone, Copy, Debug)]
 pub enum Against {
-    /// Its source's method in `f64`: state by state, iteration by iteration or substep by substep.
+    /// The source's method in `f64`, state by state: after each iteration or substep.
     Method(fn(&mut Model, &Run)),
-    /// The solution of its law, after many of its iterations.
+    /// The solution of the solver's law, compared after many iterations.
     Solution(fn(&mut Model, &Run)),
 }
 
@@ -17,28 +17,28 @@ pub enum Against {
 pub struct AgreementEntry {
     /// The solver.
     pub solver: &'static str,
-    /// What it is compared with.
+    /// The reference.
     pub against: Against,
-    /// Best settings of its source, as the source has them.
+    /// Best settings, as the source recommends them.
     pub best: &'static str,
-    /// What departs from the source and can be taken back in `f64`, by its place.
+    /// Departures from the source that can be undone in `f64`; `Run::undo` is an index into this list.
     pub departs: &'static [&'static str],
-    /// Largest distance that a test allows (1), and the reason where it is not [`ROUNDING`].
+    /// Largest distance that a test allows (1), and the reason if it is not [`ROUNDING`].
     pub bound: f64,
     pub why: &'static str,
-    /// Mechanisms that are left out.
+    /// Mechanisms left out in the comparison.
     pub without: &'static [&'static str],
 }
 
-/// Distance that single precision makes of ten iterations: their 10³ operations round by 6·10⁻⁸ each, and the worst case
-/// adds up.
+/// Distance caused by single precision in ten iterations: each of their 10³ operations rounds by 6·10⁻⁸, and
+/// in the worst case the errors add up.
 pub const ROUNDING: f64 = 6e-5;
 
 const fn entry(solver: &'static str, against: Against, best: &'static str) -> AgreementEntry {
     AgreementEntry { solver, against, best, departs: &[], bound: ROUNDING, why: "", without: &[] }
 }
 
-/// The entry of a solver.
+/// The entry of a solver of this name.
 pub fn find(solver: &str) -> Option<AgreementEntry> {
     TABLE.iter().copied().find(|e| e.solver == solver)
 }

@@ -1,15 +1,17 @@
 //! Comparison of two studies: changes beyond the noise.
 //!
-//! Settings in both studies are paired by scene, solver, budget, order and lanes. **Errors** have no noise: the same
-//! program gives the same bits, so every difference is a change. They are compared with the tolerance of the scene:
-//! an error below [`NEGLIGIBLE`] of it counts as zero. **Times** have noise: both studies run the same steps in the
-//! same blocks, so block k is paired with block k, and the median of the ratios has an interval ([`Ratio`]). The
-//! machines may differ in speed; the median ratio over all settings can be divided out.
+//! Settings in both studies are paired by scene, solver, budget, order and lanes. **Errors** have no noise:
+//! the same program gives the same bits, so every difference is a change. They are compared with the
+//! tolerance of the scene: an error below [`NEGLIGIBLE`] of it counts as zero. **Times** have noise. Both
+//! studies run the same steps in the same blocks, so block k is paired with block k, and the median of the
+//! ratios has an interval ([`Ratio`]). The machines may differ in speed; the median ratio over all settings
+//! can be divided out.
 //!
-//! Two runs of one binary differ as well: by memory placement, clock rate and load. The measurable part widens every
-//! interval ([`Noise`]): a fixed loop, timed between the rounds, measures the speed of the machine; the scatter of
-//! the settings around their common ratio measures placement; and the time that threads waited measures the load.
-//! A change of one solver shows in all its settings, and is found below that noise ([`solvers`]).
+//! Two runs of one binary differ as well, by memory placement, clock rate and load. The measurable part of
+//! this widens every interval ([`Noise`]): a fixed loop, timed between the rounds, measures the speed of the
+//! machine; the scatter of the settings around their common ratio measures placement; the time that threads
+//! waited measures the load. A change of one solver shows in all its settings, so it is detected even below
+//! that noise ([`solvers`]).
 
 pub mod solvers;
 pub mod text;
@@ -24,22 +26,22 @@ use crate::lab::study::sample::{Sample, median};
 use serde::Serialize;
 use solvers::SolverChange;
 
-/// Errors below this share of their tolerance are as good as none (1).
+/// Errors below this fraction of their tolerance count as zero (1).
 pub const NEGLIGIBLE: f64 = 0.01;
 
-/// How to judge.
+/// Options of a comparison.
 #[derive(Clone, Copy, Debug)]
 pub struct CompareOptions {
     /// Smallest increase of a time or an error that counts as a regression (1): 0.1 is 10 %.
     pub threshold: f64,
-    /// Divide times by what all settings have in common.
+    /// Whether times are divided by their common ratio.
     pub relative: bool,
 }
 
 /// A setting in both studies.
 #[derive(Clone, Debug, Serialize)]
 pub struct SettingPair {
-    /// Name with size.
+    /// Name of the scene, with its size.
     pub scene: String,
     /// Name of the solver.
     pub solver: &'static str,
@@ -49,16 +51,16 @@ pub struct SettingPair {
     pub lanes: usize,
     /// Work per step, for tables.
     pub budget: String,
-    /// The failures before and after, if a setting did not hold.
+    /// The failures before and after; `None` for a setting that holds.
     #[serde(rename = "holds", serialize_with = "words")]
     pub marks: [Option<Mark>; 2],
-    /// Errors that both have, by axis.
+    /// Errors that both studies have.
     pub errors: Vec<ErrorChange>,
-    /// Time after ÷ time before; none if one of them has no time.
+    /// Change of time; `None` if one of the studies has no time.
     pub time: Option<TimeChange>,
 }
 
-/// `yes`, or what happened.
+/// `yes`, or the word for the failure.
 fn words<S: serde::Serializer>(marks: &[Option<Mark>; 2], serializer: S) -> Result<S::Ok, S::Error> {
     marks.map(|mark| mark.map_or("yes", Mark::word)).serialize(serializer)
 }
@@ -66,13 +68,13 @@ fn words<S: serde::Serializer>(marks: &[Option<Mark>; 2], serializer: S) -> Resu
 /// An error before and after.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ErrorChange {
-    /// `penetration`, `residual` or `reference`.
+    /// `penetration`, `residual`, `rest speed` or `reference`.
     pub error: &'static str,
     /// Its unit.
     pub unit: &'static str,
     /// Before and after.
     pub values: [f64; 2],
-    /// The share that is negligible.
+    /// Value below which an error is negligible.
     pub negligible: f64,
 }
 
@@ -83,64 +85,64 @@ pub struct TimeChange {
     pub cost_ns: [f64; 2],
     /// Longest step (ns), before and after.
     pub longest_step_ns: [f64; 2],
-    /// Ratio over paired blocks, divided by the common one where times are relative.
+    /// Median ratio over paired blocks; divided by the common one if times are relative.
     pub ratio: f64,
-    /// Its interval, with the [`Noise`] between two runs.
+    /// Interval of the ratio, widened by the [`Noise`] between two runs.
     pub interval: [f64; 2],
 }
 
-/// Differences between two runs of one program, as logarithms of ratios (1).
+/// Noise between two runs of one program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Noise {
-    /// Time of the fixed loop after, in that before (1); all times are divided by it.
+    /// Time of the fixed loop after ÷ before (1); all times are divided by it.
     pub machine: f64,
-    /// Scatter of the settings around their common ratio; 0 of too few.
+    /// Scatter of the logarithms of the settings' ratios around their median (1); 0 for too few settings.
     pub scatter: f64,
-    /// Share of the time that threads waited, in the busier of the two (1).
+    /// Fraction of the time that threads waited, in the busier of the two runs (1).
     pub waited: f64,
-    /// By how much every interval is widened, both ways.
+    /// Widening of every interval in both directions, as a logarithm of a ratio (1).
     pub allowed: f64,
 }
 
-/// Difference that remains between two runs on an idle machine, because code and data lie at other addresses.
+/// Difference that remains between two runs on an idle machine, because code and data are at other addresses.
 const PLACEMENT: f64 = 0.02;
 
-/// Settings whose scatter says something.
+/// Fewest settings from which scatter is estimated.
 const FEWEST: usize = 8;
 
 impl Noise {
-    /// Of all pairs: logarithms of their ratios, what the machine did, and the share of waiting.
+    /// From all pairs: logarithms of their ratios, ratio of the fixed loop, and fraction of waiting.
     ///
-    /// The settings are alike in most, so that their scatter is noise: the largest of n normal numbers is below
+    /// Most settings are unchanged, so their scatter is noise. The largest of n normal numbers is below
     /// √(2 ln n) + 1 standard deviations 19 times in 20.
     fn of(logs: &[f64], machine: f64, waited: f64) -> Self {
         let scatter = if logs.len() < FEWEST { 0.0 } else { scatter(logs) };
         let most = (2.0 * (logs.len().max(2) as f64).ln()).sqrt() + 1.0;
-        // The loop has no memory and no vectors: half of what it says is not what the settings feel.
+        // The loop uses neither memory nor vectors, so half of its change may not apply to the settings.
         let allowed = PLACEMENT + most * scatter + waited + 0.5 * machine.ln().abs();
         Noise { machine, scatter, waited, allowed }
     }
 }
 
-/// Standard deviation of normal numbers whose median deviation is d: 1.48 d.
+/// Standard deviation of normal numbers, estimated as 1.48 d from their median deviation d.
 fn scatter(logs: &[f64]) -> f64 {
     let middle = median(logs);
     1.4826 * median(&logs.iter().map(|x| (x - middle).abs()).collect::<Vec<_>>())
 }
 
-/// Better, worse, or neither that anybody need act on.
+/// Whether a change matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// By more than the threshold.
+    /// Better by more than the threshold.
     Better,
-    /// Within the threshold, the noise, or what is negligible.
+    /// Within the threshold, the noise, or the negligible range.
     Same,
-    /// By more than the threshold.
+    /// Worse by more than the threshold.
     Worse,
 }
 
-/// Growth of `after` over `before`, judged.
+/// Verdict on the ratio `growth` = after ÷ before.
 fn judged(growth: f64, threshold: f64) -> Verdict {
     if growth > 1.0 + threshold {
         Verdict::Worse
@@ -151,7 +153,7 @@ fn judged(growth: f64, threshold: f64) -> Verdict {
     }
 }
 
-/// The same, of a growth that is known within an interval: [`Verdict::Same`] where that contains 1.
+/// Verdict on a ratio known within an interval: [`Verdict::Same`] if the interval contains 1.
 fn judged_within(growth: f64, [low, high]: [f64; 2], threshold: f64) -> Verdict {
     if low <= 1.0 && 1.0 <= high { Verdict::Same } else { judged(growth, threshold) }
 }
@@ -162,27 +164,27 @@ impl ErrorChange {
         self.values[0].to_bits() != self.values[1].to_bits()
     }
 
-    /// After over before, each at least what is negligible (1).
+    /// After ÷ before, with both raised to at least the negligible value (1).
     pub fn growth(&self) -> f64 {
         let [before, after] = self.values.map(|v| v.max(self.negligible));
         if before == after { 1.0 } else { after / before }
     }
 
-    /// See [`Verdict`].
+    /// Verdict on the change.
     pub fn verdict(&self, threshold: f64) -> Verdict {
         judged(self.growth(), threshold)
     }
 }
 
 impl TimeChange {
-    /// See [`Verdict`]; a difference that cannot be told from noise is none.
+    /// Verdict on the change. A difference within the noise counts as [`Verdict::Same`].
     pub fn verdict(&self, threshold: f64) -> Verdict {
         judged_within(self.ratio, self.interval, threshold)
     }
 }
 
 impl SettingPair {
-    /// Whether it holds no more, or again.
+    /// Whether the setting stopped holding, or holds again.
     pub fn holding(&self) -> Verdict {
         match self.marks.map(|m| m.is_none()) {
             [true, false] => Verdict::Worse,
@@ -192,24 +194,24 @@ impl SettingPair {
     }
 }
 
-/// The whole comparison.
+/// Result of a comparison.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
-    /// The noise that was allowed for.
+    /// Noise that was allowed for.
     pub noise: Noise,
-    /// Median ratio of times over all settings (1); none without times.
+    /// Median ratio of times over all settings (1); `None` without times.
     pub common: Option<f64>,
-    /// Whether times are divided by it.
+    /// Whether times are divided by the common ratio.
     pub relative: bool,
     /// See [`CompareOptions::threshold`].
     pub threshold: f64,
-    /// Settings that both have.
+    /// Settings that both studies have.
     pub pairs: Vec<SettingPair>,
-    /// Solvers against the others.
+    /// Changes by solver, relative to the other solvers.
     pub solvers: Vec<SolverChange>,
-    /// Settings that only the first has, and only the second.
+    /// Number of settings that only the first study has, and that only the second has.
     pub alone: [usize; 2],
-    /// Words for what was chosen differently, and where.
+    /// Differences in settings and machines, as text.
     pub differences: Vec<String>,
 }
 
@@ -263,7 +265,7 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &CompareOptions) 
     }
 }
 
-/// Differences between two runs of the same program.
+/// Noise between the two studies.
 fn noise(before: &StudyFile, after: &StudyFile, pairs: &[SettingPair]) -> Noise {
     let logs: Vec<f64> = pairs.iter().filter_map(|p| p.time.map(|t| t.ratio.ln())).collect();
     let mean = |study: &StudyFile, of: fn(&Sample) -> f64| {
@@ -312,7 +314,7 @@ fn pair(one: &Record, other: &Record) -> SettingPair {
     }
 }
 
-/// Differences in settings and machine.
+/// Differences in settings and machines, as text.
 fn differences(before: &StudyFile, after: &StudyFile) -> Vec<String> {
     let mut found = Vec::new();
     let mut differ = |what: &str, a: String, b: String| {
@@ -383,7 +385,7 @@ mod tests {
         let found = compare(&before, &slower, &STRICT);
         assert_eq!(found.pairs[0].time.unwrap().verdict(0.1), Verdict::Worse);
         assert!(found.regressed() && found.pairs[0].errors[0].verdict(0.1) == Verdict::Same);
-        // Faster is no regression.
+        // A faster setting is not a regression.
         assert!(!compare(&slower, &before, &STRICT).regressed());
 
         let fallen = study(vec![fell(8, 1, 10.0, 1e-3)]);
@@ -394,7 +396,7 @@ mod tests {
 
     #[test]
     fn what_is_negligible_is_no_regression() {
-        // The tolerance is 1 cm: a hundredth of it is 0.1 mm.
+        // The tolerance is 1 cm; a hundredth of it is 0.1 mm.
         let of = |depth| study(vec![record(8, 1, 10.0, depth)]);
         assert!(!compare(&of(1e-9), &of(9e-5), &STRICT).regressed());
         assert!(compare(&of(1e-9), &of(1.2e-4), &STRICT).regressed());
@@ -415,14 +417,15 @@ mod tests {
         assert_eq!(count(&relative), 1);
     }
 
-    /// Two studies of one program, of `count` settings whose times scatter by `scatter` from run to run and whose
-    /// machine is `machine` times as slow the second time; setting 0 is `slower` times as slow.
+    /// Two studies of one program with `count` settings. Times scatter by `scatter` from run to run, the
+    /// machine is slower by the factor `machine` in the second study, and setting 0 is slower by the factor
+    /// `slower`.
     fn two_runs(count: u32, scatter: f64, machine: f64, slower: f64, seed: u64) -> Comparison {
         use rand::{RngExt, SeedableRng};
         let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
         let mut run = |machine: f64, slower: f64| {
             let records = (0..count).map(|i| {
-                // Sums of three are near enough to normal; one setting in 30 lies where it is twice as bad.
+                // Sums of three are close enough to normal. One setting in 30 scatters twice as much.
                 let normal: f64 = (0..3).map(|_| random.random_range(-1.0..1.0)).sum();
                 let own = if i % 30 == 7 { 2.0 * scatter } else { scatter };
                 let own = machine * (own * normal).exp() * if i == 0 { slower } else { 1.0 };
@@ -465,7 +468,7 @@ mod tests {
         let noisy = |seed: u64| {
             let mut r = record(8, 1, 10.0, 1e-3);
             let sample = r.sample.as_mut().unwrap();
-            // ±30 %, and no trend.
+            // ±30 %, without a trend.
             sample.blocks_ns[0].iter_mut().enumerate().for_each(|(i, ns)| {
                 *ns *= 1.0 + 0.3 * (((i as u64 * 7 + seed * 13) % 11) as f64 / 5.0 - 1.0);
             });

@@ -1,8 +1,8 @@
-//! Times of one solver against those of the others.
+//! Times of one solver relative to those of the others.
 //!
-//! A slow spell of the machine hits all settings of a scene alike, because they are timed interleaved. So the deviation
-//! of a setting from its scene's common ratio says what the solver did: the median over a solver's settings finds a
-//! slowdown that no single setting shows.
+//! A slow spell of the machine hits all settings of a scene alike, because they are timed interleaved. So the
+//! deviation of a setting from its scene's common ratio is due to the solver. The median over a solver's
+//! settings reveals a slowdown that no single setting shows.
 
 use super::{FEWEST, SettingPair, Verdict, judged_within};
 use crate::lab::study::sample::median;
@@ -10,30 +10,30 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 
-/// With fewer solvers the common ratio would be that of one of them.
+/// Fewest solvers on a scene; with fewer, the common ratio would be that of one of them.
 const FEWEST_SOLVERS: usize = 3;
 
 /// A solver's times after ÷ before, relative to the other solvers on the same scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SolverChange {
-    /// Name.
+    /// Name of the solver.
     pub solver: &'static str,
-    /// Settings with times in both studies.
+    /// Number of settings with times in both studies.
     pub settings: usize,
     /// Median over the settings (1).
     pub ratio: f64,
-    /// Its interval (1).
+    /// Interval of the ratio (1).
     pub interval: [f64; 2],
 }
 
 impl SolverChange {
-    /// See [`Verdict`].
+    /// Verdict on the change.
     pub fn verdict(&self, threshold: f64) -> Verdict {
         judged_within(self.ratio, self.interval, threshold)
     }
 }
 
-/// By solver, where there are enough settings and solvers to say something.
+/// Changes by solver, for scenes with enough solvers and for solvers with enough settings.
 pub fn changes(pairs: &[SettingPair]) -> Vec<SolverChange> {
     let mut scenes: BTreeMap<&str, BTreeMap<&'static str, Vec<f64>>> = BTreeMap::new();
     for pair in pairs {
@@ -52,8 +52,8 @@ pub fn changes(pairs: &[SettingPair]) -> Vec<SolverChange> {
     enough.map(|(solver, all)| change(solver, &all)).collect()
 }
 
-/// The median of k normal numbers with standard deviation σ has the standard error √(π/2) σ/√k; three of them hold
-/// 997 times in 1000.
+/// The median of k normal numbers with standard deviation σ has the standard error √(π/2) σ/√k. Three
+/// standard errors cover 997 of 1000 cases.
 fn change(solver: &'static str, deviations: &[f64]) -> SolverChange {
     let middle = median(deviations);
     let scatter = super::scatter(deviations);
@@ -69,7 +69,7 @@ mod tests {
     use crate::lab::compare::TimeChange;
     use rand::{RngExt, SeedableRng};
 
-    /// Seven solvers on six scenes: every scene has its own spell, every setting its scatter.
+    /// Seven solvers on six scenes, with a slow spell per scene and scatter per setting.
     fn race(seed: u64, slower: f64) -> Vec<SolverChange> {
         let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
         let mut pairs = Vec::new();

@@ -5,17 +5,17 @@ use crate::engine::world::Order;
 use crate::lab::report::table::{finish, table};
 use crate::lab::report::units::{digits, lanes, ratio, si};
 
-/// Rows of each list, unless `--all`.
+/// Rows of each list, unless `--all` is given.
 const ROWS: usize = 10;
 
-/// One change, and by how much it changed (1).
+/// One change, with its ratio (1).
 struct ChangeLine {
     cells: [String; 7],
     growth: f64,
     verdict: Verdict,
 }
 
-/// The changes, regressions first; every change with `all`.
+/// The changes as text, regressions first; with `all`, every change.
 pub fn text(found: &Comparison, all: bool) -> String {
     let [only_before, only_after] = found.alone;
     let mut text = format!("{} settings in both", found.pairs.len());
@@ -41,7 +41,7 @@ pub fn text(found: &Comparison, all: bool) -> String {
         n.machine
     );
     text += "\n";
-    // The widths of a setting end in the same bits: one of them says what happened.
+    // All widths of a setting end in the same bits, so one of them is enough.
     let own = |p: &SettingPair| (p.scene.clone(), p.solver, p.budget.clone(), p.order);
     let mut once: Vec<&SettingPair> = found.pairs.iter().collect();
     once.dedup_by_key(|p| own(p));
@@ -70,13 +70,13 @@ pub fn text(found: &Comparison, all: bool) -> String {
     text + if found.regressed() { "regression: yes\n" } else { "regression: no\n" }
 }
 
-/// How many became better and worse, and the greatest changes.
+/// A list: how many entries became better and worse, and the largest changes.
 fn section(title: &str, mut lines: Vec<ChangeLine>, all: bool) -> String {
     let count = |verdict| lines.iter().filter(|l| l.verdict == verdict).count();
     let mut text = format!("{title}; {} worse, {} better\n", count(Verdict::Worse), count(Verdict::Better));
     lines.retain(|l| l.verdict != Verdict::Same || all);
     lines.sort_by(|a, b| b.growth.ln().abs().total_cmp(&a.growth.ln().abs()));
-    // Worse before better before the rest.
+    // Worse entries first, then better, then the rest.
     lines.sort_by_key(|l| {
         [Verdict::Worse, Verdict::Better, Verdict::Same].iter().position(|v| *v == l.verdict)
     });
@@ -120,7 +120,7 @@ fn holding(pair: &SettingPair) -> Option<ChangeLine> {
 }
 
 fn errors(pair: &SettingPair, threshold: f64) -> Vec<ChangeLine> {
-    // The widths of a setting have the same bits: one of them will do.
+    // All widths of a setting have the same errors, so one of them is enough.
     let line = |e: &super::ErrorChange| {
         let [before, after] = e.values.map(|v| if e.unit.is_empty() { ratio(v) } else { si(v, e.unit) });
         ChangeLine {

@@ -1,20 +1,22 @@
-//! How many iterations every solver needs on exactly the same problem.
+//! Counts the iterations that every solver needs on exactly the same problem.
 //!
-//! A frozen problem is solved by the simulation's own code ([`replay`]): one step without
-//! substeps, with a budget of k iterations, for k = 0, 1, 2, … After each the natural-map residual
-//! is measured in `f64` on the `f32` velocities and impulses, in units of
-//! [`ContactProblem::impulse_unit`], against two laws that are never mixed:
+//! A frozen problem is solved by the simulation's own code ([`replay`]): one step without substeps, with a
+//! budget of k iterations, for k = 0, 1, 2, … After each, the natural-map residual is measured in `f64` on
+//! the `f32` velocities and impulses, as a multiple of [`ContactProblem::impulse_unit`], against two laws
+//! that are never mixed:
 //!
 //! - the *rigid* law, the same for all;
-//! - the solver's *own* law, that of its last velocity sweep. Position feedback, softness and missing friction define
-//!   other laws; a solver may solve its own law to the last bit and never approach the rigid one.
+//! - the solver's *own* law, that of its last velocity sweep. Position feedback, softness and missing
+//!   friction define other laws. A solver may solve its own law to the last bit and never approach the rigid
+//!   one.
 //!
-//! An *iteration* is what the solver's row counts as one ([`Variant::iterations`]): mostly one velocity sweep, and
-//! one relaxing sweep where the solver relaxes. *Sweeps* are what the solver itself counts. Residuals are limited by
-//! `f32`, at about 1e-6 times the largest impulse; a tolerance that is not reached within the cap has no number.
+//! An *iteration* is defined by the solver ([`Variant::iterations`]): usually one velocity sweep, plus one
+//! relaxing sweep if the solver relaxes. *Sweeps* are counted by the solver itself. Residuals are limited by
+//! `f32` to about 1e-6 times the largest impulse. A tolerance that is not reached within the maximum number
+//! of iterations has no number.
 //!
-//! Iterations to a tolerance are exact: k is dense up to 128 and then grows by 1/64, and between
-//! two such k the first one that reaches a tolerance is looked for.
+//! Iterations to a tolerance are exact: k takes every value up to 128 and then grows by 1/64, and the first k
+//! that reaches a tolerance is searched between two such values.
 //!
 //! Methods in `f64` that share no code with the solvers ([`crate::lab::reference`]) are run for comparison.
 
@@ -47,7 +49,7 @@ use std::collections::BTreeMap;
 use timing::IterationTime;
 use warm::{WarmStartSource, Warmed};
 
-/// Residuals whose first iteration is reported (1).
+/// Residuals for which the first iteration that reaches them is reported (1).
 pub const TOLERANCES: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 
 /// Solvers and options of a run.
@@ -55,7 +57,7 @@ pub const TOLERANCES: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 pub struct ConvergeOptions {
     /// Solvers, in this order.
     pub solvers: Vec<&'static Variant>,
-    /// Most iterations.
+    /// Maximum iterations.
     pub max_iterations: u32,
     /// Seed of the shuffled order.
     pub seed: u64,
@@ -63,9 +65,9 @@ pub struct ConvergeOptions {
     pub width: LaneWidth,
     /// Parameters of solvers, by name.
     pub overrides: Vec<Override>,
-    /// Timing rounds; none for no times.
+    /// Rounds of timing; 0 skips timing.
     pub rounds: u32,
-    /// Measure the rate of Gauss–Seidel in `f64`, which may take seconds.
+    /// Whether to measure the rate of Gauss–Seidel in `f64`, which may take seconds.
     pub baseline: bool,
 }
 
@@ -92,9 +94,9 @@ pub struct CurvePoint {
     pub sweeps: usize,
     /// Residual of the rigid law (1).
     pub rigid: f64,
-    /// Residual of the solver's own law (1); none before the first velocity sweep.
+    /// Residual of the solver's own law (1); `None` before the first velocity sweep.
     pub own: Option<f64>,
-    /// Relative mass-norm distance of the velocities from the reference (1).
+    /// Relative mass-norm distance of the velocities from the reference (1); `None` without a reference.
     pub velocity_error: Option<f64>,
 }
 
@@ -103,38 +105,38 @@ pub struct CurvePoint {
 pub struct Reached {
     /// Index into [`ReplayCurve::points`] of the first point within each of [`TOLERANCES`].
     pub first: [Option<usize>; TOLERANCES.len()],
-    /// The iterations of those points.
+    /// Iterations of those points.
     pub iterations: [Option<u32>; TOLERANCES.len()],
-    /// Smallest residual after at least one iteration (1): the start is no work of the solver. Infinite where there
-    /// is none.
+    /// Smallest residual after at least one iteration (1), because the start is not the solver's work.
+    /// Infinite if there is no such residual.
     pub smallest: f64,
-    /// Asymptotic factor per iteration, fitted above the rounding floor; none where the fall is
-    /// too fast or too short to fit.
+    /// Asymptotic factor per iteration, fitted above the rounding floor; `None` if the curve falls too fast
+    /// or is too short for a fit.
     pub rate: Option<f64>,
 }
 
-/// One solver in one order from one start.
+/// A curve: one solver in one order from one start.
 #[derive(Clone, Debug, Serialize)]
 pub struct ReplayCurve {
-    /// Name of the solver, with its stage if it is only one of several.
+    /// Name of the solver; if the curve is of a part of its schedule, the name says so.
     pub solver: String,
-    /// Whether that is not its whole schedule.
+    /// Whether it is only a part of the solver's schedule.
     pub is_part: bool,
-    /// `f32`: code of the simulation; `f64`: methods for comparison.
+    /// `f32` for code of the simulation, `f64` for the methods run for comparison.
     pub arithmetic: &'static str,
     /// Order of the contacts.
     pub order: Sequence,
     /// Impulses at the start.
     pub start: Start,
-    /// States, by iterations.
+    /// States, in ascending order of iterations.
     pub points: Vec<CurvePoint>,
-    /// Under the rigid law.
+    /// Result under the rigid law.
     pub rigid: Reached,
-    /// Under the solver's own law.
+    /// Result under the solver's own law.
     pub own: Reached,
-    /// Whether the two laws were the same all along.
+    /// Whether the two laws were the same in all states.
     pub own_is_rigid: bool,
-    /// Time of an iteration; none if not measured.
+    /// Time of an iteration; `None` if not measured.
     pub iteration: Option<IterationTime>,
 }
 
@@ -145,23 +147,23 @@ pub struct ConvergeReport {
     pub problem: String,
     /// Bodies that are not static.
     pub bodies: usize,
-    /// Contact points.
+    /// Number of contact points.
     pub contacts: usize,
-    /// Rows of joints.
+    /// Number of rows of joints.
     #[serde(skip_serializing_if = "is_zero")]
     pub joint_rows: usize,
     /// Unit of residuals (N·s).
     pub impulse_unit: f64,
-    /// The reference's certificate; none if velocities could not be compared.
+    /// The reference's certificate; `None` without a reference.
     pub certificate: Option<Certificate>,
-    /// Where warm starts come from; without any there are no warm curves.
+    /// Where warm starts come from. Without warm starts there are no warm curves.
     pub warm_start: WarmStartSource,
-    /// Solvers without warm starting, if there are warm starts: they have no warm curves.
+    /// Solvers without warm starting, which have no warm curves. Empty if there are no warm starts at all.
     pub forgetful: Vec<String>,
     /// Lanes in colored order.
     pub lanes: usize,
-    /// Factor per sweep of Gauss–Seidel in `f64` ([`gauss_seidel_rate`]); none where it comes to no solution, or
-    /// too fast.
+    /// Factor per sweep of Gauss–Seidel in `f64` ([`gauss_seidel_rate`]); `None` if it does not converge, or
+    /// converges too fast to fit.
     pub gauss_seidel_rate: Option<f64>,
     /// See [`TOLERANCES`].
     pub tolerances: [f64; TOLERANCES.len()],
@@ -173,7 +175,7 @@ fn is_zero(count: &usize) -> bool {
     *count == 0
 }
 
-/// A solver's schedule as a function of the number of iterations.
+/// A solver's schedule, parameterized by the number of iterations.
 struct IteratedSchedule {
     variant: &'static Variant,
     name: String,
@@ -181,7 +183,7 @@ struct IteratedSchedule {
 }
 
 impl IteratedSchedule {
-    /// The whole schedule, and the one without its relaxing sweeps, which would hide what the
+    /// The whole schedule and, if it has relaxing sweeps, the one without them: relaxing sweeps hide what the
     /// sweeps before them converge to.
     fn of(variant: &'static Variant) -> Vec<IteratedSchedule> {
         let whole = IteratedSchedule { variant, name: variant.name.into(), relaxes: variant.uses.relax };
@@ -198,7 +200,8 @@ impl IteratedSchedule {
 
 /// Runs every solver of `options` on `problem`.
 ///
-/// Errors: a problem that is not valid, is out of the range of `f32`, or has neither contacts nor joints; a reference that does not hold.
+/// Errors: a problem that is not valid, exceeds the range of `f32`, or has neither contacts nor joints; a
+/// reference that is not a solution.
 ///
 /// ```
 /// use simpulse::engine::solvers::find;
@@ -228,7 +231,8 @@ pub fn converge(
     converge_watched(problem, reference, options, &|_, _, _| ())
 }
 
-/// The same; tells how many of how many parts are done, and which is next.
+/// The same with progress: `tell` receives the number of finished parts, the total, and the name of the next
+/// part.
 pub fn converge_watched(
     problem: &ContactProblem,
     reference: Option<&Reference>,
@@ -249,7 +253,7 @@ pub fn converge_watched(
         options.solvers.iter().flat_map(|v| IteratedSchedule::of(v)).collect();
     let mut curves = Vec::new();
     let mut timers = Vec::new();
-    // Every order of every schedule, then times, then methods in f64.
+    // One part for each order of each schedule, one for times, one for methods in f64.
     let parts = schedules.len() * orders.len() + 2;
     for schedule in &schedules {
         for order in orders {
@@ -295,14 +299,14 @@ pub fn converge_watched(
     })
 }
 
-/// Whether warm-start impulses make a difference to this solver.
+/// Whether this solver's result depends on warm-start impulses.
 fn remembers(schedule: &IteratedSchedule, replay: &mut Replay) -> bool {
     let [cold, warm] =
         [Start::Cold, Start::Warm].map(|start| replay.run(schedule.variant, schedule.budget(1), start));
     cold.velocities != warm.velocities || cold.impulses != warm.impulses
 }
 
-/// Measures an outcome; also whether its own law was the rigid one.
+/// Measures an outcome; also returns whether its own law was the rigid one.
 fn measure(
     problem: &ContactProblem,
     reference: Option<&Reference>,
@@ -323,7 +327,7 @@ fn measure(
         own_is_rigid = own.friction || !has_friction;
         let contacts = (0..problem.contacts.len()).map(|i| Target::Rigid.row(problem, i));
         for (row, rigid) in own.rows.iter().zip(contacts.chain(problem.rigid_rows())) {
-            // Gaps over h, in f32.
+            // Gaps ÷ h, in f32.
             let rounding = 1e-6 * (1.0 + rigid.bias.abs());
             own_is_rigid &= (row.bias - rigid.bias).abs() <= rounding && row.compliance == 0.0;
         }
@@ -333,7 +337,7 @@ fn measure(
     (CurvePoint { iterations, sweeps: outcome.sweeps, rigid, own, velocity_error }, own_is_rigid)
 }
 
-/// A curve that stands still within this many times the rounding floor has reached it.
+/// A curve that stagnates within this many times the rounding floor has reached the floor.
 const NEAR_FLOOR: f64 = 20.0;
 
 fn curve(
@@ -347,7 +351,7 @@ fn curve(
 ) -> ReplayCurve {
     let mut own_is_rigid = true;
     let mut points = BTreeMap::new();
-    // Changes below half a unit in the last place of the largest impulse are lost.
+    // Changes below half a unit in the last place of the largest impulse are lost to rounding.
     let unit = problem.impulse_unit();
     let floor = Cell::new(0.0_f64);
     let mut visit = |k: u32, points: &mut BTreeMap<u32, CurvePoint>| {
@@ -402,10 +406,10 @@ fn curve(
 
 const LAWS: [fn(&CurvePoint) -> Option<f64>; 2] = [|p| Some(p.rigid), |p| p.own];
 
-/// Fits end this many times above the rounding floor: a residual there is off by 1 %.
+/// Fits end at this many times the rounding floor, where residuals are off by 1 %.
 const ABOVE_FLOOR: f64 = 100.0;
 
-/// The result of `points` under `law`, with residuals rounded to about `floor`.
+/// The result of `points` under `law`; `floor` is the rounding error of residuals.
 fn reached(points: &[CurvePoint], law: fn(&CurvePoint) -> Option<f64>, floor: f64) -> Reached {
     let first =
         TOLERANCES.map(|tolerance| points.iter().position(|p| law(p).is_some_and(|r| r <= tolerance)));

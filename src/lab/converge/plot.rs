@@ -1,8 +1,7 @@
 //! `converge.svg`: residual against sweeps and, below it, against time, for each law and start.
 //!
-//! Both axes are logarithmic. One color per solver, one line style and marker per order; a marker
-//! stands where a curve first reaches a tolerance. Thin curves are the `f64` methods, which have no
-//! time.
+//! Both axes are logarithmic. One color per solver, one line style and marker per order. A marker shows where
+//! a curve first reaches a tolerance. Thin curves are the `f64` methods, which have no time.
 
 use super::replay::{Sequence, Start};
 use super::warm::WarmStartSource;
@@ -20,15 +19,15 @@ const PANEL: (i32, i32) = (560, 300);
 const LEGEND_LINE: i32 = 20;
 /// Columns of the legend.
 const COLUMNS: usize = 2;
-/// Height of a line of a note, and its characters.
+/// Height of a line of a note, and its number of characters.
 const NOTE_LINE: i32 = 15;
 const NOTE: usize = 78;
 const HEADING: i32 = 30;
-/// Space for labels left of and below a panel, and to its right.
+/// Margins left of and below a panel for labels, and right of it.
 const LEFT: i32 = 64;
 const BOTTOM: i32 = 44;
 const RIGHT: i32 = 28;
-/// Decades of residuals that are shown; what is outside is drawn at the edge.
+/// Decades of residuals that are shown. Values outside are drawn at the edge.
 const DECADES: (i32, i32) = (-8, 1);
 
 /// Value of a curve's point on the horizontal axis.
@@ -41,7 +40,7 @@ struct PanelRow {
     reached: fn(&ReplayCurve) -> &Reached,
 }
 
-/// The color of a solver by its name.
+/// Maps the name of a solver to its color.
 pub type Colors<'a> = &'a dyn Fn(&str) -> picture::Color;
 
 /// The picture as SVG text.
@@ -66,7 +65,7 @@ fn draw(report: &ConvergeReport, colors: Colors, text: &mut String) -> Drawn {
     let notes: Vec<Vec<String>> = rows.iter().map(|row| coinciding(report, row)).collect();
     let note_lines: usize = notes.iter().map(Vec::len).sum();
     let height = (HEADING + panels * PANEL.1) * rows.len() as i32 + NOTE_LINE * note_lines as i32;
-    // One panel below the other, so that a narrow screen shows them large enough.
+    // Panels are stacked vertically, so that they are large enough on a narrow screen.
     let size = (PANEL.0, top + height);
     let root = SVGBackend::with_string(text, (size.0 as u32, size.1 as u32)).into_drawing_area();
     root.fill(&WHITE)?;
@@ -116,14 +115,14 @@ fn rows(report: &ConvergeReport) -> Vec<PanelRow> {
     rows
 }
 
-/// The color of a curve: its solver's; paler for a part of the solver, such as `shim without relaxing`.
+/// The color of a curve: its solver's, paler for a part of the solver such as `shim without relaxing`.
 fn color(solver: &str, colors: Colors) -> RGBAColor {
     let (name, part) = solver.split_once(" without ").map_or((solver, false), |(name, _)| (name, true));
     let picture::Color(r, g, b, _) = colors(name.split(' ').next().unwrap_or(name));
     RGBColor(r, g, b).mix(if part { 0.4 } else { 1.0 })
 }
 
-/// Solvers whose curves cover each other in a row, `a = b`, in lines; none where no curves do.
+/// A note on solvers whose curves coincide in a row, `a = b`, in lines; empty if there are none.
 fn coinciding(report: &ConvergeReport, row: &PanelRow) -> Vec<String> {
     let curves: Vec<&ReplayCurve> = report.curves.iter().filter(|c| c.start == row.start).collect();
     let values = |c: &ReplayCurve| c.points.iter().map(|p| (p.sweeps, (row.residual)(p))).collect::<Vec<_>>();
@@ -205,7 +204,7 @@ fn panel(
 ) -> Drawn {
     let (left, top) = (corner.0 + LEFT, corner.1);
     let (right, bottom) = (corner.0 + PANEL.0 - RIGHT, corner.1 + PANEL.1 - BOTTOM);
-    // Where the start makes no difference to a solver, its cold curve stands for both.
+    // If a solver's result does not depend on the start, its cold curve stands for both.
     let remembers = |c: &ReplayCurve| {
         let same = |o: &&ReplayCurve| o.solver == c.solver && o.order == c.order && o.start == Start::Warm;
         report.curves.iter().any(|o| same(&o))
@@ -261,7 +260,7 @@ fn panel(
     Ok(())
 }
 
-/// 10ⁿ, or the number itself where that is shorter.
+/// 10ⁿ, or the plain number if that is shorter.
 fn decade(exponent: i32) -> String {
     match exponent {
         0 => "1".into(),
@@ -270,7 +269,7 @@ fn decade(exponent: i32) -> String {
         n => format!("1e{n}"),
     }
 }
-/// Note on lanes wider than the native ones of this build.
+/// Note on lanes wider than this build's instructions.
 fn emulated(lanes: usize) -> &'static str {
     if lanes > native_width().lanes() { ", emulated" } else { "" }
 }

@@ -1,9 +1,9 @@
-//! One frozen problem, solved by the simulation's own code: rows, contacts and batches are made
-//! from the problem instead of a world, and a step is run on them again and again.
+//! One frozen problem, solved by the simulation's own code. Rows, contacts and batches are made from the
+//! problem instead of a world, and a step is run on them repeatedly.
 //!
-//! Masses, velocities, gaps and impulses are rounded to `f32`. Anchors are recovered from the arms,
-//! r = −(r × t) n + (r × n) t, and the step forms its arms from them again; so the arms that are
-//! solved differ from the frozen ones by a few roundings, as everything in `f32` does. Joints have the frozen rows (`rows`).
+//! Masses, velocities, gaps and impulses are rounded to `f32`. Anchors are recovered from the arms, r =
+//! −(r × t) n + (r × n) t, and the step computes its arms from them again. So the arms differ from the frozen
+//! ones by a few roundings, as everything in `f32` does. Joints have the frozen rows (`rows`).
 
 use super::rows::FrozenJoints;
 use super::setup;
@@ -30,7 +30,7 @@ use rand::{SeedableRng, seq::SliceRandom};
 use std::fmt;
 use std::time::{Duration, Instant};
 
-/// In which order the contacts are solved.
+/// Order in which the contacts are solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Sequence {
@@ -38,7 +38,7 @@ pub enum Sequence {
     Natural,
     /// Color by color, in lanes.
     Colored,
-    /// One after the other, in an order drawn from this seed.
+    /// One after the other, in a random order with this seed.
     Shuffled(u64),
 }
 
@@ -53,7 +53,7 @@ impl fmt::Display for Sequence {
 }
 
 impl Sequence {
-    /// `0..count` in this order; colors keep the natural one.
+    /// `0..count` in this order; for colored order, in natural order.
     pub fn order(self, count: usize) -> Vec<u32> {
         let mut order: Vec<u32> = (0..count as u32).collect();
         if let Sequence::Shuffled(seed) = self {
@@ -67,9 +67,9 @@ impl Sequence {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Start {
-    /// Without impulses.
+    /// Zero impulses.
     Cold,
-    /// With the problem's warm-start impulses, and what the solver itself keeps.
+    /// The problem's warm-start impulses, and the solver's internal state.
     Warm,
 }
 
@@ -79,18 +79,18 @@ impl fmt::Display for Start {
     }
 }
 
-/// Result of a step.
+/// Result of one run.
 #[derive(Clone, Debug)]
 pub struct Replayed {
     /// v⁺, one per body.
     pub velocities: Vec<Velocity>,
-    /// How far each body has moved and turned (m, m, rad).
+    /// Displacement and rotation of each body (m, m, rad).
     pub moves: Vec<Velocity>,
-    /// (λn, λt), one per contact point, then (λ, 0) of every row of joints (N·s).
+    /// (λn, λt) of each contact point, then (λ, 0) of each row of joints (N·s).
     pub impulses: Vec<DPair>,
-    /// Constraint sweeps of every kind.
+    /// Number of constraint sweeps of every kind.
     pub sweeps: usize,
-    /// The law of the last velocity sweep, if there was one.
+    /// The law of the last velocity sweep; `None` if there was none.
     pub own: Option<OwnLaw>,
 }
 
@@ -99,29 +99,29 @@ pub struct Replayed {
 pub struct OwnLaw {
     /// One row per contact point, then one per row of joints.
     pub rows: Vec<OwnRow>,
-    /// Whether it had friction rows.
+    /// Whether the sweep had friction rows.
     pub friction: bool,
 }
 
-/// Bias (m/s) of a row whose impulse is to be zero: no body is as fast.
+/// Bias (m/s) of a row that must not act: larger than any speed.
 const OUT_OF_REACH: f64 = 1e30;
 
-/// A frozen problem in the form that solvers run on, in one order.
+/// A frozen problem in the form that solvers use, in one order.
 pub struct Replay<'a> {
     problem: &'a ContactProblem,
     work: Workspace,
     rows: Vec<BodyRow>,
-    /// Rows of the step before, and what the solver of this name has kept since.
+    /// Rows of the previous step, and the internal state of the solver of this name after it.
     rows_before: Vec<BodyRow>,
     kept: Option<(&'static str, Kept)>,
     contacts: Vec<Contact>,
-    /// Contact and point within it that each contact of the problem became.
+    /// For each contact of the problem: index of its contact here, and of its point in that contact.
     places: Vec<(usize, usize)>,
     scratch: Vec<Contact>,
     input: StepInput,
     width: LaneWidth,
     sequence: Sequence,
-    /// Those of the problem, and one that is static if there are joints.
+    /// Bodies of the problem and, if there are joints, a static one.
     bodies: Bodies,
     joints: FrozenJoints,
     /// The solver of the last run.
@@ -129,7 +129,7 @@ pub struct Replay<'a> {
 }
 
 impl<'a> Replay<'a> {
-    /// Sets the problem up. Errors: a problem that is not valid, or has numbers beyond `f32`.
+    /// Sets up the problem. Errors: a problem that is not valid, or exceeds the range of `f32`.
     pub fn new(
         problem: &'a ContactProblem,
         sequence: Sequence,
@@ -139,8 +139,9 @@ impl<'a> Replay<'a> {
         Self::set_up(problem, sequence, width, parameters, false)
     }
 
-    /// As [`Self::new`] in natural order, without mechanisms: in every substep, which is as long as the problem's step, forces
-    /// act anew and contacts are as deep as bodies have moved.
+    /// As [`Self::new`] in natural order, for runs with substeps, with the mechanisms `without` left out.
+    /// Each substep is as long as the problem's step. Forces act in every substep, and contact depths follow
+    /// the motion of the bodies.
     pub fn in_substeps(
         problem: &'a ContactProblem,
         parameters: Parameters,
@@ -182,7 +183,7 @@ impl<'a> Replay<'a> {
             impacts: ImpactLaw::None,
             points,
         };
-        // The rows start at v*, and nothing is added to them: forces are in it already.
+        // The rows start at v*, which includes forces already, so nothing is added to them.
         let motion = MotionInput {
             gravity: [0.0; 2],
             h,
@@ -222,8 +223,9 @@ impl<'a> Replay<'a> {
         Ok(replay)
     }
 
-    /// Warm starts of solvers that keep numbers of their own come from steps on this problem, which differs in its
-    /// velocities alone; without this call, from steps on the problem itself. Errors: numbers beyond `f32`.
+    /// Sets the problem of the previous step, which differs only in velocities. Warm starts of solvers with
+    /// internal state come from steps on it; without this call, from steps on the problem itself. Errors:
+    /// numbers beyond the range of `f32`.
     pub fn follow(&mut self, before: &ContactProblem) -> Result<(), Error> {
         for (row, body) in self.rows_before.iter_mut().zip(&before.bodies) {
             let [x, y, turn] = body.free_velocity.map(|v| v as f32);
@@ -233,7 +235,7 @@ impl<'a> Replay<'a> {
         setup::check_range(self.input.h, &self.rows_before, &self.contacts)
     }
 
-    /// One step of `variant` with `budget`, from the problem's start.
+    /// Runs one step of `variant` with `budget`, from the problem's start.
     pub fn run(&mut self, variant: &'static Variant, budget: Budget, start: Start) -> Replayed {
         self.reset(variant, start);
         self.work.observe = true;
@@ -254,7 +256,7 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// Time of one such step, its preparation included.
+    /// Time of such a step, including its preparation.
     pub fn time(&mut self, variant: &'static Variant, budget: Budget, start: Start) -> Duration {
         self.reset(variant, start);
         self.work.observe = false;
@@ -265,7 +267,7 @@ impl<'a> Replay<'a> {
         begin.elapsed()
     }
 
-    /// A step of the solver that was set by [`Self::reset`].
+    /// A step of the solver set by [`Self::reset`].
     fn step(&mut self, input: &StepInput, clock: &mut Clock) -> WorkCount {
         let Some(solver) = &mut self.solver else { return WorkCount::default() };
         solvers::run(solver.as_mut(), &mut self.work, &mut self.scratch, clock, input, self.width)
@@ -295,7 +297,8 @@ impl<'a> Replay<'a> {
         self.work.types.clone_from(&self.joints.groups[usize::from(start == Start::Cold)]);
     }
 
-    /// Lets a solver keep what it does after [`STEPS`] steps on the problem of the step before.
+    /// Gives a solver the internal state that it has after [`STEPS`] steps on the problem of the previous
+    /// step.
     fn keep(&mut self, variant: &'static Variant) {
         if self.kept.as_ref().is_none_or(|(name, _)| *name != variant.name) {
             let watch = self.work.watch.take();
@@ -315,7 +318,7 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// The law of the last sweep, at the separations that it saw.
+    /// The law of the last sweep, at the separations that the sweep used.
     ///
     /// s = gap + n·(Δx + (R(Δθ) − 1) r), b minus a, with n·(R(Δθ) − 1) r = sin Δθ (r × n) +
     /// (1 − cos Δθ)(r × t).
@@ -343,8 +346,8 @@ impl<'a> Replay<'a> {
         Some(OwnLaw { rows: contacts.chain(joints).collect(), friction: rule.friction })
     }
 
-    /// The law of the last sweep for the rows of a block: λ ← (1 − γ_i) λ − K⁻¹ γ_m (β C + J v) leaves impulses alone where
-    /// J v + β C + (γ_i/γ_m) K λ = 0. An open limit may close.
+    /// The law of the last sweep for the rows of a block: λ ← (1 − γ_i) λ − K⁻¹ γ_m (β C + J v) leaves
+    /// impulses unchanged if J v + β C + (γ_i/γ_m) K λ = 0. An open limit may close.
     fn own_rows(&self, rule: &ObservedRule, joint: &ProblemJoint, block: &ProblemBlock) -> Vec<OwnRow> {
         let Softness { bias_rate, mass_scale, impulse_scale } = rule.joints;
         let delta = |body: Option<u32>| body.map_or([0.0; 4], |b| rule.deltas[b as usize].map(f64::from));
@@ -364,7 +367,7 @@ impl<'a> Replay<'a> {
         block.rows.iter().map(own).collect()
     }
 
-    /// Gives every contact its lane, as a world's step does.
+    /// Assigns a lane to every contact, as a world's step does.
     fn assign_lanes(&mut self) {
         let (problem, bodies) = (self.problem, self.bodies.len());
         let (work, features, contacts) = (&mut self.work, &self.input.features, &self.contacts);

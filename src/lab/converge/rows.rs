@@ -1,7 +1,7 @@
 //! Joints of a frozen problem as a joint type of the simulation: their rows are the frozen ones.
 //!
-//! Axes and arms stay those of the start of the step, and an error changes by J times what bodies have moved: where a
-//! solver moves bodies and solves again, the rows are those of the tangent.
+//! Axes and arms remain those of the start of the step, and an error changes by J times the motion of the
+//! bodies. So if a solver moves bodies and solves again, its rows are the tangent ones.
 
 use crate::engine::bodies::Bodies;
 use crate::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
@@ -12,10 +12,10 @@ use crate::lab::error::Error;
 use crate::lab::reference::validate::BLOCKS;
 use crate::lab::reference::{BlockLaw, ContactProblem, DPair, ProblemBlock, ProblemJoint};
 
-/// Which blocks a joint has: rows of each, and its law.
+/// Blocks of a joint: the number of rows and the law of each.
 type ProblemBlocks = [Option<(usize, LawForm)>; BLOCKS];
 
-/// A law without its numbers.
+/// Kind of a law, without its numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum LawForm {
     Rigid,
@@ -25,7 +25,7 @@ enum LawForm {
     CappedSpring,
 }
 
-/// Numbers of a row: axis, arms and error.
+/// Numbers per row: axis (two), two arms, error.
 const ROW: usize = 5;
 
 impl LawForm {
@@ -47,7 +47,7 @@ impl LawForm {
         }
     }
 
-    /// Kept per row: the impulse, and the error of a spring.
+    /// Numbers kept per row: the impulse, and the error of a spring.
     const fn kept(self) -> usize {
         match self {
             LawForm::Rigid | LawForm::Limit | LawForm::Motor => 1,
@@ -83,7 +83,7 @@ fn form(joint: &ProblemJoint) -> ProblemBlocks {
     form
 }
 
-/// Numbers of a block.
+/// Numbers of a block, in the order in which the kernel reads them.
 fn numbers(block: &ProblemBlock) -> Vec<f32> {
     let rows = block.rows.iter().flat_map(|row| [row.axis[0], row.axis[1], row.arm_a, row.arm_b, row.error]);
     let law = match block.law {
@@ -97,7 +97,7 @@ fn numbers(block: &ProblemBlock) -> Vec<f32> {
 impl JointType for FrozenJoint {
     type Form = ProblemBlocks;
 
-    /// Their lengths are all that is known of them.
+    /// Vectors of the right length; the directions of anchors are not in the problem.
     fn anchors(&self) -> [[f64; 2]; 2] {
         self.reach.map(|reach| [reach, 0.0])
     }
@@ -141,16 +141,18 @@ fn block<L: Lanes, const N: usize>(law: LawForm, numbers: &[L], kept: &mut [L], 
     on.block(j, error, law.law(&numbers[ROW * N..]), kept);
 }
 
-/// The joints of a problem in groups that are solved together, and where each went: its group, and its place there.
+/// The joints of a problem in groups that are solved together, with the group of each joint and its index in
+/// the group.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FrozenJoints {
-    /// The groups, with warm impulses or without.
+    /// The groups with warm impulses, and the same without.
     pub groups: [Vec<Joined>; 2],
     places: Vec<(usize, usize)>,
 }
 
 impl FrozenJoints {
-    /// Joints in this `order`, static sides on body `ground`. `h`: the step (s). Errors: a number beyond `f32`.
+    /// Adds joints in this `order`, with static sides on body `ground`. `h`: the step (s). Errors: a number
+    /// beyond the range of `f32`.
     pub fn new(
         problem: &ContactProblem,
         order: &[u32],
@@ -214,7 +216,7 @@ impl FrozenJoints {
     }
 }
 
-/// What a block keeps at the start of a warm step.
+/// Kept numbers of a block at the start of a warm step.
 fn warm_impulses(block: &ProblemBlock) -> impl Iterator<Item = f32> {
     let errors = (LawForm::of(&block.law).kept() - 1) * block.rows.len();
     block.rows.iter().map(|row| row.warm_impulse as f32).chain(std::iter::repeat_n(0.0, errors))

@@ -1,4 +1,4 @@
-//! Methods in `f64` that share no code with the solvers, as curves to compare with.
+//! Methods in `f64` that share no code with the solvers, as curves for comparison.
 
 use super::replay::{Sequence, Start};
 use super::{ConvergeOptions, CurvePoint, LAWS, ReplayCurve, reached};
@@ -8,8 +8,8 @@ use crate::lab::reference::residual::Target;
 use crate::lab::reference::sweeps::{self, Splitting, Stop};
 use crate::lab::reference::{ContactProblem, DPair};
 
-/// Scalar methods in `f64`, from `truth`. A contact is solved row by row there, so where there is
-/// friction the order of rows differs a little from the solvers'.
+/// Curves of the scalar methods in `f64` of [`crate::lab::reference`]. These solve a contact row by row, so
+/// with friction the order of rows differs slightly from the solvers' order.
 pub(super) fn curves(
     problem: &ContactProblem,
     reference: Option<&Reference>,

@@ -9,8 +9,9 @@ use crate::lab::error::Error;
 use crate::lab::reference::{ContactProblem, ProblemContact};
 use glam::Vec2;
 
-/// Those of the problem, and one for the static sides of joints, which have a body on either side; at the end of a step
-/// without contacts, or `pushed`: at its beginning, under forces that act in every substep of h.
+/// Bodies of the problem and, if there are joints, a static one for their static sides, because a joint has a
+/// body on either side. Velocities are those at the end of a step without contacts. With `pushed` they are
+/// those at its start, and forces act in every substep of h.
 pub(super) fn bodies(problem: &ContactProblem, pushed: bool) -> Bodies {
     let mut bodies = Bodies::default();
     for b in &problem.bodies {
@@ -29,7 +30,7 @@ pub(super) fn bodies(problem: &ContactProblem, pushed: bool) -> Bodies {
             bullet: false,
             shapes: Vec::new(),
         };
-        // Zero inverses become infinite masses, and those zero inverses again.
+        // Zero inverses become infinite masses, which become zero inverses again.
         let mass = MassProperties { mass: 1.0 / b.inv_mass, inertia: 1.0 / b.inv_inertia, center: [0.0; 2] };
         let i = bodies.push(&def, &mass);
         if pushed && moves {
@@ -46,11 +47,11 @@ pub(super) fn bodies(problem: &ContactProblem, pushed: bool) -> Bodies {
     bodies
 }
 
-/// Contacts of one or two points, and where each contact of the problem went.
+/// Contacts of one or two points, and the place of each contact of the problem among them.
 ///
-/// Solvers want body b to be dynamic. Where it is not, the sides are exchanged: n and t change
-/// sign, and with them r × n and r × t, while the anchors stay. An impulse λn n + λt t on b is
-/// −λn n − λt t on a, so (λn, λt) are the same in the new frame.
+/// Solvers require body b to be dynamic. If it is not, the sides are exchanged: n and t change sign, and with
+/// them r × n and r × t, while the anchors remain. An impulse λn n + λt t on b is −λn n − λt t on a, so
+/// (λn, λt) are the same in the new frame.
 pub(super) fn contacts(problem: &ContactProblem, inert: u32) -> (Vec<Contact>, Vec<(usize, usize)>) {
     let dynamic = |body: Option<u32>| {
         body.is_some_and(|b| {
@@ -60,7 +61,7 @@ pub(super) fn contacts(problem: &ContactProblem, inert: u32) -> (Vec<Contact>, V
     };
     let (mut contacts, mut places) = (Vec::new(), Vec::new());
     for manifold in problem.contacts.chunk_by(|p, q| p.manifold == q.manifold && p.friction == q.friction) {
-        // A manifold of the crate has at most two points and one friction; others are cut.
+        // A manifold of the engine has at most two points and one friction coefficient; others are split.
         for pair in manifold.chunks(2) {
             let c = &pair[0];
             let exchanged = !dynamic(c.body_b);
@@ -99,7 +100,7 @@ pub(super) fn contacts(problem: &ContactProblem, inert: u32) -> (Vec<Contact>, V
     (contacts, places)
 }
 
-/// Features of the problem's constraints, without restitution and damping.
+/// Features of the problem's constraints; restitution and damping are off.
 pub(super) fn features(problem: &ContactProblem, contacts: &[Contact]) -> Features {
     let friction = problem.contacts.iter().any(|c| c.friction > 0.0);
     let two_points = contacts.iter().any(|c| c.manifold.count > 1);

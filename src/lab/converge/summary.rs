@@ -1,14 +1,14 @@
-//! Convergence in sentences.
+//! Summary of convergence in sentences.
 
 use super::replay::{Sequence, Start};
 use super::{ConvergeReport, Reached, ReplayCurve, TOLERANCES};
 use crate::engine::lanes::native_width;
 
-/// Places in [`TOLERANCES`] of the two that the summary names.
+/// Indices in [`TOLERANCES`] of the two tolerances in the summary.
 const TOLD: [usize; 2] = [1, 3];
 
-/// Which solver needs how many sweeps to 1e-2 and to 1e-4, cold and warm, beside the rate of
-/// Gauss–Seidel. Whole schedules in colored order.
+/// Sweeps that each solver needs to 1e-2 and to 1e-4, cold and warm, next to the rate of Gauss–Seidel. Whole
+/// schedules in colored order.
 pub fn text(report: &ConvergeReport) -> String {
     let own: Vec<&ReplayCurve> = report
         .curves
@@ -80,7 +80,7 @@ fn sentence(curves: &[&ReplayCurve], at: usize, start: Start) -> String {
     text + ".\n"
 }
 
-/// Measured rates beside that of Gauss–Seidel.
+/// Measured rates, compared with that of Gauss–Seidel.
 fn baseline(report: &ConvergeReport, curves: &[&ReplayCurve]) -> String {
     let Some(rate) = report.gauss_seidel_rate else {
         return "Gauss–Seidel in f64 has no rate here: it never converges, or at once.\n".into();

@@ -6,10 +6,10 @@ use crate::lab::error::Error;
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 
-/// Where a tolerance is not reached.
+/// Shown for a tolerance that is not reached.
 const NEVER: &str = "—";
 
-/// Human-readable tables: iterations to each tolerance, and times where they were measured.
+/// Human-readable tables: iterations to each tolerance and, if measured, times.
 pub fn text(report: &ConvergeReport) -> String {
     let mut out = format!(
         "{}: {} bodies, {} contact points{}; residuals in units of {:.4e} N·s\n{}\n",
@@ -54,7 +54,7 @@ pub fn text(report: &ConvergeReport) -> String {
     out
 }
 
-/// Where warm starts come from, and which curves there are not.
+/// Where warm starts come from, and which curves are missing.
 fn starts(report: &ConvergeReport) -> String {
     let mut text = match report.warm_start {
         WarmStartSource::Captured => {
@@ -106,7 +106,7 @@ fn reference_line(report: &ConvergeReport) -> String {
     }
 }
 
-/// One row per curve, or two where the solver's own law is not the rigid one.
+/// One row per curve, or two if the solver's own law differs from the rigid one.
 fn laws(curve: &ReplayCurve) -> impl Iterator<Item = (&ReplayCurve, &'static str, &Reached)> {
     let own = (!curve.own_is_rigid).then_some((curve, "own", &curve.own));
     [(curve, "rigid", &curve.rigid)].into_iter().chain(own)
@@ -144,7 +144,7 @@ fn count(point: &CurvePoint) -> String {
     }
 }
 
-/// Nanoseconds in a unit that suits them, three digits.
+/// A time (ns) with a suitable unit and three digits.
 fn duration(ns: f64) -> String {
     let (value, unit) = match ns {
         0.0 => return "0".into(),
@@ -157,7 +157,7 @@ fn duration(ns: f64) -> String {
     format!("{value:.digits$} {unit}")
 }
 
-/// A state of a curve, as a line of CSV.
+/// A point of a curve, as a line of CSV.
 #[derive(Serialize)]
 struct StateLine<'a> {
     problem: &'a str,
@@ -199,7 +199,7 @@ pub fn csv(report: &ConvergeReport) -> Result<String, Error> {
     String::from_utf8(bytes).map_err(|e| refuse(e.to_string()))
 }
 
-/// The whole report. Numbers that are not finite become null.
+/// The whole report. Non-finite numbers become null.
 pub fn json(report: &ConvergeReport) -> Result<String, Error> {
     let text = serde_json::to_string(report);
     Ok(text.map_err(|e| Error::invalid("converge.json", e.to_string()))? + "\n")

@@ -3,26 +3,27 @@
 use super::IteratedSchedule;
 use super::replay::{Replay, Start};
 
-/// Shortest difference of two runs that is timed (ns), far above the clock's resolution.
+/// Shortest time difference that is measured (ns), far above the clock's resolution.
 const TIMED_NS: f64 = 50_000.0;
 
-/// Time of an iteration (ns), set-up excluded; of rounds that are all alike.
+/// Time of an iteration (ns), without set-up, over identical rounds.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct IterationTime {
     /// Median over the rounds.
     pub median_ns: f64,
-    /// Quartiles over them: each round is a difference of two runs, so that a mean would be of what interrupted them.
+    /// Quartiles over the rounds. There is no mean: each round is a difference of two runs, and interruptions
+    /// would dominate it.
     pub quartiles_ns: [f64; 2],
 }
 
 /// Time of an iteration of each case.
 ///
-/// The difference between two steps of few and many iterations, over the difference of their
-/// numbers, so that set-up is not counted. Every round times every case once, so that a disturbance
-/// of the machine meets all of them.
+/// This is the time difference between two steps with few and with many iterations ÷ the difference of their
+/// numbers, so set-up is not counted. Every round times every case once, so a slow spell of the machine
+/// affects all cases alike.
 ///
-/// A solver that has found its answer may have nothing left to do, and iterations beyond it cost nothing. So where
-/// more iterations change no bit, those up to the answer are timed, again and again.
+/// A solver that has reached its final state may have nothing left to do, so further iterations cost nothing.
+/// If more iterations change no bit, the iterations up to that state are timed repeatedly instead.
 pub(super) fn time(cases: &mut [(&IteratedSchedule, &mut Replay)], rounds: u32) -> Vec<IterationTime> {
     let ranges: Vec<Range> = cases.iter_mut().map(|(schedule, replay)| Range::of(schedule, replay)).collect();
     let mut samples = vec![Vec::new(); cases.len()];
@@ -44,7 +45,7 @@ pub(super) fn time(cases: &mut [(&IteratedSchedule, &mut Replay)], rounds: u32) 
 struct Range {
     few: u32,
     more: u32,
-    /// How often.
+    /// Number of repetitions.
     times: u32,
 }
 

@@ -1,35 +1,36 @@
 //! Warm starts: the impulses of the previous step.
 //!
-//! A problem that was captured from a scene has the impulses of the step before. One that has none may have a
-//! certified reference λ. Then the step before is taken to be the same problem under loads that differ by up to
-//! [`OFF`], and its solution needs no solving: with factors drawn per contact point,
+//! A problem that was captured from a scene contains the impulses of the step before. A problem without them
+//! may have a certified reference λ. Then the previous step is defined as the same problem under loads that
+//! differ by up to [`OFF`], and its solution is known: with factors drawn per contact point,
 //!
 //! ```text
 //! λ′ = (1 + OFF u) λ, −1 ≤ u ≤ 1        v*′ = v* − M⁻¹ Jᵀ (λ′ − λ)
 //! ```
 //!
-//! the velocities are those of the reference, impulses are in their cones, and what was open, stuck or slipping still
-//! is. Impulses of motors and springs, which their laws determine from the velocities, are left as they are.
-//! Warm starts are λ′: exact for the step before, off by up to a tenth for this one.
+//! the velocities are those of the reference, impulses are in their cones, and each contact remains open,
+//! sticking or slipping as it is in the reference. Impulses of motors and springs, which their laws determine
+//! from the velocities, are unchanged. Warm starts are λ′: exact for the previous step, off by up to a tenth
+//! for this one.
 //!
-//! Solvers with numbers of their own ([`crate::engine::solvers::Variant::kept`]: multipliers, penalties, drifts)
-//! have made [`STEPS`] steps on the step before, at their standard budget without substeps.
+//! Solvers with internal state ([`crate::engine::solvers::Variant::kept`]: multipliers, penalties, drifts)
+//! first make [`STEPS`] steps on the previous step's problem, at their standard budget without substeps.
 
 use crate::lab::reference::certify::Reference;
 use crate::lab::reference::{BlockLaw, ContactProblem, DPair};
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 
-/// Greatest relative difference of an impulse from that of the step before (1).
+/// Largest relative difference of an impulse from that of the previous step (1).
 pub const OFF: f64 = 0.1;
-/// Steps that solvers with numbers of their own have made before: a second.
+/// Steps that solvers with internal state make first: one second.
 pub const STEPS: u32 = 60;
 
 /// Where the impulses of warm starts come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum WarmStartSource {
-    /// The problem has them.
+    /// The problem contains them.
     Captured,
     /// Drawn around the reference, see the [module](self).
     Drawn,
@@ -37,23 +38,23 @@ pub enum WarmStartSource {
     None,
 }
 
-/// The problem with impulses for warm starts, and the step before it.
+/// The problem with warm-start impulses, and the previous step's problem.
 pub(super) struct Warmed {
     pub origin: WarmStartSource,
-    /// The problem, with warm impulses if there are any.
+    /// The problem, with warm-start impulses if there are any.
     pub problem: ContactProblem,
-    /// The problem of the step before, with the same contacts.
+    /// The previous step's problem, with the same contacts.
     pub before: ContactProblem,
 }
 
-/// Finds impulses to start from.
+/// Determines warm-start impulses.
 pub(super) fn warmed(problem: &ContactProblem, reference: Option<&Reference>) -> Warmed {
     let (mut warm, mut before) = (problem.clone(), problem.clone());
     let has = |p: &ContactProblem| p.warm_impulses().iter().any(|l| *l != [0.0; 2]);
     let origin = match reference {
         _ if has(problem) => WarmStartSource::Captured,
         Some(reference) => {
-            // The same whatever the seed of the shuffled order is.
+            // The seed is fixed, independent of the seed of the shuffled order.
             let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(1);
             let rows = problem.blocks().flat_map(|(_, _, block)| block.rows.iter().map(|_| block.law));
             let moves = problem

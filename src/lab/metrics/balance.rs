@@ -1,8 +1,8 @@
 //! Balances of a step: momentum, angular momentum and energy.
 //!
-//! External to the dynamic bodies are weight, applied forces and the impulses of contacts
-//! with static and kinematic bodies, all of which are known. Damping is external too, but
-//! its impulse is not known: a scene with damping shows it as imbalance and as lost energy.
+//! Weight, applied forces and the impulses of contacts with static and kinematic bodies are external to the
+//! dynamic bodies, and all of them are known. Damping is external, too, but its impulse is unknown: it
+//! appears as imbalance and as lost energy.
 
 use super::joints::Given;
 use super::law::{BodyStep, PointStep};
@@ -10,13 +10,13 @@ use super::state::{BodyState, shadow_energy_change};
 use crate::engine::bodies::BodyKind;
 use glam::DVec2;
 
-/// Sums over a run; see [`Balance::close`] for what they are measured in.
+/// Sums over a run; see [`Balance::close`] for their scales.
 #[derive(Clone, Debug)]
 pub struct Balance {
     dt: f64,
     substeps: f64,
-    /// Reference point of angular momentum: the center of mass at the start, so that
-    /// nothing cancels far from the origin (m).
+    /// Reference point of angular momentum: the center of mass at the start, to avoid cancellation far from
+    /// the origin (m).
     center: DVec2,
     mass: f64,
     /// √(Σ(m r² + I)/Σm) about `center` (m).
@@ -37,45 +37,45 @@ pub struct Balance {
     unexplained_max: f64,
     kinetic_start: f64,
     kinetic_max: f64,
-    /// Work of weight, applied forces and joints so far, and the least that it ever was (J).
+    /// Work of weight, applied forces and joints so far, and its minimum so far (J).
     work: [f64; 2],
-    /// The fastest point of a kinematic body at which it touched another (m/s).
+    /// Highest speed of a contact point of a static or kinematic body (m/s).
     drive: f64,
-    /// The fastest that joints pull bodies together which start apart (m/s).
+    /// Highest speed at which joints close their initial gaps (m/s).
     closing: f64,
 }
 
-/// A scene whose kinetic energy exceeds all that it can have by this factor has blown up (1).
+/// A scene has blown up if its kinetic energy exceeds the largest possible one by this factor (1).
 const BLOW_UP: f64 = 100.0;
 
 /// Imbalances, all relative.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Imbalance {
-    /// Of momentum.
+    /// Momentum imbalance.
     pub momentum: f64,
-    /// Of angular momentum.
+    /// Angular momentum imbalance.
     pub angular_momentum: f64,
     /// Energy gained (positive) or lost over the run.
     pub energy_change: f64,
-    /// Most energy created in one step.
+    /// Largest energy created in one step.
     pub energy_created: f64,
     /// Energy that springs and motors of joints gave over the run.
     pub joint_work: f64,
-    /// Energy that friction took over the run; negative if it gave.
+    /// Energy dissipated by friction over the run; negative if it added energy.
     pub friction_loss: f64,
-    /// Energy that normal impulses took over the run; negative if they gave.
+    /// Energy dissipated by normal impulses over the run; negative if they added energy.
     pub impact_loss: f64,
-    /// Most energy in one step that no impulse explains.
+    /// Largest energy gain of one step that no impulse explains.
     pub energy_unexplained: f64,
 }
 
 impl Balance {
-    /// A run of steps `dt` (s) in equal substeps that starts at `bodies`.
+    /// Starts a run at `bodies`, with steps of `dt` (s) in equal substeps.
     pub fn new(bodies: &[BodyState], dt: f64, substeps: u32) -> Self {
         let mass: f64 = bodies.iter().map(BodyState::mass).sum();
         let inertia: f64 = bodies.iter().map(BodyState::inertia).sum();
         let per_mass = |sum: f64| if mass > 0.0 { sum / mass } else { 0.0 };
-        // Relative to the first body: sums of products with far positions would round.
+        // Relative to the first body: sums of products with far positions would lose precision.
         let origin = bodies.first().map_or(DVec2::ZERO, |b| b.position);
         let moment: DVec2 = bodies.iter().map(|b| b.mass() * (b.position - origin)).sum();
         let center = if mass > 0.0 { origin + moment / mass } else { origin };
@@ -106,31 +106,33 @@ impl Balance {
         }
     }
 
-    /// Sum of the dynamic bodies' mass (kg).
+    /// Total mass of the dynamic bodies (kg).
     pub fn mass(&self) -> f64 {
         self.mass
     }
 
-    /// Where the impulses of a step act on a body, from the reference point of angular momentum (m); see [`Self::add`].
+    /// Point at which the impulses of a step act on a body, relative to the reference point of angular
+    /// momentum (m); see [`Self::add`].
     pub fn acts_at(&self, body: &BodyStep) -> DVec2 {
         let middle = 0.5 * (1.0 - 1.0 / self.substeps);
         body.before.position + middle * (body.after.position - body.before.position) - self.center
     }
 
-    /// Adds a step: every body, every contact point with its bodies' indices, and what joints gave.
+    /// Adds a step: every body, every contact point with the indices of its bodies, and the contribution of
+    /// joints.
     ///
-    /// *Where forces act.* In free fall in n substeps weight acts at x₀, x₁, … x_{n−1}; the
-    /// torque that this makes about any fixed point is that of Δt F at
-    /// x̄ = x₀ + ½(1 − 1/n)(x_n − x₀), exactly, because all xₖ − x₀ − k h v₀ are parallel
-    /// to F. Contact impulses are spread over the substeps alike, and are taken there too.
+    /// *Where forces act.* In free fall in n substeps, weight acts at x₀, x₁, … x_{n−1}. The moment of this
+    /// about any fixed point is exactly that of Δt F at x̄ = x₀ + ½(1 − 1/n)(x_n − x₀), because all xₖ − x₀ −
+    /// k h v₀ are parallel to F. Contact impulses are assumed to be spread evenly over the substeps, and to
+    /// act there, too.
     ///
     /// *Work of kinematic bodies* is the impulse on b times the velocity of the kinematic
     /// material point.
     ///
-    /// *What impulses take* is, by the midpoint rule, −λ (u⁻ + u⁺)/2 along each axis of a
-    /// contact. In one substep that is all that changes the shadow energy, exactly but for the
-    /// rounding; what is left over is positions that were moved without velocities, and, in
-    /// more substeps, that velocities did not run straight from u⁻ to u⁺.
+    /// *Energy dissipated by impulses* is, by the midpoint rule, −λ (u⁻ + u⁺)/2 along each axis of a contact.
+    /// With one substep nothing else changes the shadow energy, up to rounding. The rest comes from positions
+    /// that were moved without velocities and, with several substeps, from velocities that did not change
+    /// linearly from u⁻ to u⁺.
     pub fn add(&mut self, bodies: &[BodyStep], points: &[([usize; 2], PointStep)], given: &Given) {
         let (mut momentum, mut angular, mut energy, mut kinetic) = (DVec2::ZERO, 0.0, 0.0, 0.0);
         for body in bodies.iter().filter(|b| b.after.inv_mass > 0.0) {
@@ -184,15 +186,14 @@ impl Balance {
     }
 
     /// The imbalances of the run so far, relative to these scales:
-    /// - momentum: M v with v the larger of the fastest rms speed √(2 E_kin/M) of the run
-    ///   and the speed that weight gives in one step; the largest that the sum of
-    ///   imbalances ever was;
+    /// - momentum: M v with v the larger of the fastest rms speed √(2 E_kin/M) of the run and the speed that
+    ///   weight gives in one step; the imbalance is the largest that the sum ever was;
     /// - angular momentum: the same times the radius of gyration of the whole scene;
-    /// - energy: the largest kinetic energy plus weight × the radius of gyration of the
-    ///   bodies about their own centers; the energy is the shadow energy of
-    ///   [`shadow_energy_change`], less the work of kinematic bodies.
+    /// - energy: the largest kinetic energy plus weight × the radius of gyration of the bodies about their
+    ///   own centers; the energy is the shadow energy of [`shadow_energy_change`], minus the work of
+    ///   kinematic bodies.
     ///
-    /// Where a scale is zero, nothing ever moved, and the imbalance is zero.
+    /// If a scale is zero, nothing ever moved, and the imbalance is zero.
     pub fn close(&self) -> Imbalance {
         let by_weight = self.weight * self.dt;
         let momentum = (2.0 * self.kinetic_max * self.mass).sqrt().max(by_weight);
@@ -209,20 +210,21 @@ impl Balance {
         }
     }
 
-    /// What energies are measured in (J), see [`Self::close`].
+    /// Scale of energies (J), see [`Self::close`].
     pub fn energy_scale(&self) -> f64 {
         self.kinetic_max + self.weight * self.body_size
     }
 
-    /// Joints start `gaps` (m) apart, all together. Rigid rows may close them in one step, and a chain adds up their speeds.
+    /// Sets the sum of the joints' initial gaps, `gaps` (m). Rigid rows may close them in one step, and a
+    /// chain adds up their speeds.
     pub fn start_apart(&mut self, gaps: f64) {
         self.closing = gaps / self.dt;
     }
 
-    /// Whether `kinetic` (J) is more than a hundred times what the bodies began with, fell for since they were
-    /// highest, would gain by falling their own size, and had if all of them left the fastest kinematic point at
-    /// twice its speed or closed the gaps of joints in a step. Read from poses and velocities: impulses may be what
-    /// explodes.
+    /// Whether `kinetic` (J) exceeds a hundred times the sum of: the initial kinetic energy; the energy of
+    /// the fall since the bodies were highest; the energy of a fall by their own size; and the energy if all
+    /// bodies left the fastest kinematic point at twice its speed and closed the gaps of joints in a step. It
+    /// uses poses and velocities only, because impulses may be what explodes.
     pub fn is_blown_up(&self, kinetic: f64) -> bool {
         let given = 0.5 * self.mass * ((2.0 * self.drive).powi(2) + self.closing.powi(2));
         let has = self.kinetic_start + (self.work[0] - self.work[1]) + given + self.weight * self.body_size;
@@ -235,7 +237,7 @@ pub fn weight(bodies: &[BodyState]) -> f64 {
     bodies.iter().filter(|b| b.inv_mass > 0.0).map(|b| b.force.length()).sum()
 }
 
-/// value / scale, or zero if the scale is.
+/// value / scale, or zero if the scale is zero.
 pub(super) fn ratio(value: f64, scale: f64) -> f64 {
     if scale > 0.0 { value / scale } else { 0.0 }
 }

@@ -1,13 +1,13 @@
 //! Maximum, mean, root mean square and 99th percentile of lengths, in bounded memory.
 
-/// Smallest value that has a bin of its own; smaller ones count as this.
+/// Smallest value with a bin of its own; smaller values count as this.
 const FLOOR: f64 = 1e-9;
 /// Bins per factor of ten: neighbors differ by 10^(1/100), 2.3 %.
 const PER_DECADE: f64 = 100.0;
 /// Bins from [`FLOOR`] to 1000.
 const BINS: usize = 1200;
 
-/// A stream of values ≥ 0, summed up exactly but for the percentile.
+/// Statistics of a stream of values ≥ 0, exact except for the percentile.
 #[derive(Clone, Debug)]
 pub struct Distribution {
     count: u64,
@@ -36,28 +36,28 @@ impl Distribution {
         self.bins[bin.min(BINS - 1)] += 1;
     }
 
-    /// Values added.
+    /// Number of values.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// The largest value, 0 if there is none.
+    /// The largest value; 0 without values.
     pub fn max(&self) -> f64 {
         self.max
     }
 
-    /// The mean, 0 if there is none.
+    /// The mean; 0 without values.
     pub fn mean(&self) -> f64 {
         self.sum / self.count.max(1) as f64
     }
 
-    /// Root of the mean square, 0 if there is none.
+    /// The root mean square; 0 without values.
     pub fn rms(&self) -> f64 {
         (self.sum_of_squares / self.count.max(1) as f64).sqrt()
     }
 
-    /// A value that 99 % of the values do not exceed: the least such one, rounded up by at
-    /// most 2.3 %; 0 where that is below 1 nm.
+    /// 99th percentile: the smallest value that 99 % of the values do not exceed, rounded up by 2.3 % at
+    /// most; 0 if it is below 1 nm.
     pub fn p99(&self) -> f64 {
         let rank = (0.99 * self.count as f64).ceil() as u64;
         let mut below = 0;

@@ -1,10 +1,11 @@
-//! Errors of joints, the residual of their law, and what they give to bodies.
+//! Errors of joints, the residual of their law, and the impulses and energy that they give to bodies.
 //!
 //! # Law over a step
 //!
-//! Jacobians are those at the end of the step, where the motion that keeps all joints has J v⁺ = 0; v⁺ is the velocity
-//! there. With λ the sum of a row's impulses over n substeps of h, and Δt = n h, the residual is the natural map of
-//! [`crate::lab::reference::joints`], what one exact sweep over the block would change:
+//! Jacobians J and velocities v⁺ are those at the end of the step, where a motion that satisfies all joints
+//! has J v⁺ = 0. With λ the sum of a row's impulses over n substeps of h, and Δt = n h, the residual is the
+//! natural map of [`crate::lab::reference::joints`], the change that one exact sweep over the block would
+//! make:
 //!
 //! ```text
 //! rigid    r = K⁻¹ J v⁺
@@ -13,8 +14,8 @@
 //! spring   r = n (λ_n − Π((D λ_n + f)/(1 + D)))      f = −K⁻¹ (S (C⁺ − h J v⁺) + D J v⁺), |λ_n| ≤ F h
 //! ```
 //!
-//! A spring's force changes from substep to substep, so its law is that of the last one, λ_n, with the error at its start. An
-//! angular row counts in N·s as there.
+//! A spring's force changes from substep to substep, so its law is evaluated in the last one (λ_n), with the
+//! error at its start. Angular rows are converted to N·s as in that module.
 
 use super::law::BodyStep;
 use super::{Residuals, ratio};
@@ -29,20 +30,20 @@ use glam::DVec2;
 pub struct JointErrors {
     squares: f64,
     count: u64,
-    /// Greatest gap (m).
+    /// Largest gap (m).
     pub gap_max: f64,
-    /// Greatest error of a held angle (rad).
+    /// Largest error of a held angle (rad).
     pub lean_max: f64,
-    /// Greatest violation of limits (m or rad).
+    /// Largest violation of limits (m or rad).
     pub excess_max: f64,
-    /// Of the law, in the weight of the lighter body × step (1).
+    /// Law residuals, as multiples of the lighter body's weight × step (1).
     lighter: Residuals,
-    /// Of the law (N·s).
+    /// Law residuals (N·s).
     residual: Residuals,
     largest_impulse: f64,
-    /// Greatest speed that a motor below its cap misses (m/s or rad/s).
+    /// Largest speed error of a motor below its cap (m/s or rad/s).
     pub motor_miss_max: f64,
-    /// Greatest share of its cap that a motor used (1).
+    /// Largest fraction of its cap that a motor used (1).
     pub motor_load_max: f64,
     /// Energy given by springs, motors and limits (J); negative if taken.
     pub work: [f64; 3],
@@ -60,7 +61,7 @@ struct JointBlock<'a> {
     speeds: [RowVector; 2],
     /// Impulses over the step (N·s or N·m·s).
     impulses: RowVector,
-    /// To N·s.
+    /// Factors that convert impulses to N·s.
     scale: RowVector,
 }
 
@@ -89,7 +90,7 @@ impl<'a> JointBlock<'a> {
         }
     }
 
-    /// Residual of every row (N·s); see the [module](self).
+    /// Residual of each row (N·s); see the [module](self).
     fn residuals(&self, dt: f64, substeps: f64) -> RowVector {
         let (mut law, mut errors, mut speeds) = (self.law, self.errors, self.speeds[1]);
         let (mut impulses, mut times) = (self.impulses, 1.0);
@@ -111,12 +112,12 @@ impl<'a> JointBlock<'a> {
         let line = LawLine::new(law, block.size, errors, Default::default(), self.response);
         let exact = line.solution(speeds, impulses);
         let residual = [0, 1, 2].map(|i| times * self.scale[i] * (impulses[i] - exact[i]));
-        // One that overflowed counts as the largest that `f32` holds.
+        // An overflow counts as the largest `f32`.
         residual.map(|r| if r.is_finite() { r } else { f64::from(f32::MAX) })
     }
 
-    /// Energy that it gave to its bodies (J). A limit acts in an instant, at the mean of the velocities before and after; a
-    /// force all along the way.
+    /// Energy that the block gave to its bodies (J). A limit acts in an instant, at the mean of the
+    /// velocities before and after; other laws act along the whole displacement.
     fn work(&self, dt: f64) -> f64 {
         let speed = |i: usize| match self.law {
             BlockLaw::Limit => 0.5 * (self.speeds[0][i] + self.speeds[1][i]),
@@ -171,13 +172,14 @@ impl JointErrors {
         }
     }
 
-    /// Root mean square of the gaps of all joints and steps (m); none without joints.
+    /// Root mean square of the gaps of all joints and steps (m); `None` without joints.
     pub fn gap_rms(&self) -> Option<f64> {
         (self.count > 0).then(|| (self.squares / self.count as f64).sqrt())
     }
 
-    /// Root mean square and maximum of the law residual of all rows, in the weight of the lighter body × step; where no body
-    /// has weight, in the largest impulse of a row over a step. None without rows.
+    /// Root mean square and maximum of the law residual of all rows, as multiples of the lighter body's
+    /// weight × step; if no body has weight, of the largest impulse of a row over a step. `None` without
+    /// rows.
     pub fn residual(&self) -> Option<[f64; 2]> {
         let (sums, unit) = if self.lighter.count > 0 {
             (&self.lighter, 1.0)
@@ -191,23 +193,23 @@ impl JointErrors {
     }
 }
 
-/// A motor whose impulse is a smaller share of its cap than this has force left.
+/// A motor has force left if its impulse is below this fraction of its cap.
 const BELOW_CAP: f64 = 0.999;
 
 /// Impulses and energy that the joints gave to dynamic bodies in a step.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Given {
-    /// From bodies that do not move by forces (N·s).
+    /// Impulse from static and kinematic bodies (N·s).
     pub momentum: DVec2,
-    /// The same about `center` (N·m·s).
+    /// Angular impulse from them about the reference point (N·m·s).
     pub angular: f64,
-    /// By springs and motors, with the work of bodies that do not move by forces (J).
+    /// Energy from springs and motors, and from the work of kinematic bodies (J).
     pub work: f64,
 }
 
 impl Given {
-    /// By all joints of a world in its last step; `acts_at` says where the impulses of a step act on a body, from the
-    /// reference point of angular momentum (m).
+    /// From all joints of a world in its last step. `acts_at` gives the point at which the impulses of a step
+    /// act on a body, relative to the reference point of angular momentum (m).
     pub fn of(world: &World, bodies: &[BodyStep], acts_at: impl Fn(&BodyStep) -> DVec2) -> Self {
         let mut given = Given::default();
         let dt = f64::from(world.settings.dt);
@@ -222,7 +224,7 @@ impl Given {
                 let moved = body.after.position - body.before.position;
                 let turned = body.after.turn_since(&body.before);
                 if body.after.kind != BodyKind::Dynamic {
-                    // What a moving body is held back by, it gives.
+                    // A kinematic body gives the energy that the impulse on it would take.
                     given.work -= (impulse.dot(moved) + spin * turned) / dt;
                     continue;
                 }
@@ -246,7 +248,7 @@ mod tests {
     use crate::engine::solvers::find;
     use crate::engine::world::{Settings, World};
 
-    /// The world, without gravity, and a disc of 1 kg and ½ kg·m².
+    /// The world without gravity, and a disc of 1 kg and ½ kg·m².
     fn disc(solver: &str, substeps: u32) -> (World, BodyHandle, BodyHandle) {
         let variant = find(solver).unwrap();
         let mut settings = Settings { record_impulses: true, gravity: [0.0; 2], ..Settings::new(variant) };
@@ -294,7 +296,7 @@ mod tests {
         }
     }
 
-    /// A motor that is not solved misses its speed by all of it, with nearly all of its cap left.
+    /// A motor that is not solved has its full speed as error, with nearly all of its cap left.
     #[test]
     fn what_is_not_solved_is_seen() {
         let (mut world, ground, disc) = disc("pgs", 1);

@@ -1,7 +1,6 @@
 //! Residual of the contact law of Signorini and Coulomb, for the impulses of a step.
 //!
-//! Over a step a contact point has the impulse (λ_n, λ_t) and ends with the velocity
-//! (u_n, u_t). The law says
+//! Over a step a contact point has the impulse (λ_n, λ_t) and ends with the velocity (u_n, u_t). The law is
 //!
 //! ```text
 //! 0 ≤ λ_n ⊥ u_n ≥ 0,    |λ_t| ≤ µ λ_n,  and λ_t opposes u_t with |λ_t| = µ λ_n if u_t ≠ 0
@@ -16,11 +15,11 @@
 //!
 //! With ρ = effective mass, ρ = 1/(J M⁻¹ Jᵀ), both are impulses (N·s).
 //!
-//! **What u_n is.** Rigid law, whatever target the solver itself had:
+//! **What u_n is.** That of the rigid law, whatever the solver's own target was:
 //! - overlap or touch at the start (gap ≤ 0): the velocity at the end, u_n = J v⁺;
-//! - a gap: it may close, no more. u_n = (gap + J Δx)/Δt with Δx the motion over the
-//!   step. For a solver that takes one substep Δx = Δt v⁺, so this is J v⁺ + gap/Δt; one
-//!   with many may land in the midst of a step, and its v⁺ says nothing of the gap;
+//! - a gap: it may close, but no more. u_n = (gap + J Δx)/Δt with Δx the motion over the step. With one
+//!   substep Δx = Δt v⁺, so this is J v⁺ + gap/Δt. With several, a body may land within the step, and v⁺ is
+//!   unrelated to the gap;
 //! - a bounce (restitution e > 0, an impulse, approach v⁻ faster than the threshold):
 //!   Newton's law, u_n = J v⁺ + e J v⁻.
 
@@ -42,7 +41,7 @@ pub struct PointStep {
     pub friction: f64,
     /// Restitution.
     pub restitution: f64,
-    /// Slowest approach that bounces (m/s).
+    /// Approach speed above which it bounces (m/s).
     pub slowest: f64,
     /// Normal and tangential impulse on b over the step (N·s).
     pub impulse: [f64; 2],
@@ -51,9 +50,9 @@ pub struct PointStep {
 /// A body at the start and the end of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct BodyStep {
-    /// At the start.
+    /// State at the start.
     pub before: BodyState,
-    /// At the end.
+    /// State at the end.
     pub after: BodyState,
 }
 
@@ -64,7 +63,7 @@ impl BodyStep {
     }
 }
 
-/// The tangent that belongs to a normal: turned by −90°.
+/// The tangent of a normal: the normal turned by −90°.
 pub fn tangent(normal: DVec2) -> DVec2 {
     -normal.perp()
 }
@@ -84,7 +83,7 @@ impl PointStep {
         if k > 0.0 { 1.0 / k } else { 0.0 }
     }
 
-    /// Velocity of b's material point against a's, in the contact frame (m/s).
+    /// Velocity of b's material point relative to a's, in the contact frame (m/s).
     pub fn relative_velocity(&self, a: &BodyState, b: &BodyState) -> [f64; 2] {
         let relative = b.velocity_at(self.anchor_b) - a.velocity_at(self.anchor_a);
         [relative.dot(self.normal), relative.dot(tangent(self.normal))]
@@ -94,7 +93,7 @@ impl PointStep {
     pub fn velocities(&self, a: &BodyStep, b: &BodyStep, dt: f64) -> [f64; 2] {
         let [end, slip] = self.relative_velocity(&a.after, &b.after);
         let [approach, _] = self.relative_velocity(&a.before, &b.before);
-        // A slow approach may bounce, or end at rest: it is held to what it did.
+        // A slow approach may bounce or end at rest: the law of its actual outcome applies.
         let has_left = approach < 0.0 && end > -0.5 * self.restitution * approach;
         let bounces =
             self.restitution > 0.0 && self.impulse[0] > 0.0 && (has_left || approach < -self.slowest);
@@ -124,7 +123,7 @@ pub fn natural_map(impulse: [f64; 2], velocity: [f64; 2], rho: [f64; 2], frictio
     let limit = friction * normal.max(0.0);
     [
         normal - (normal - rho[0] * velocity[0]).max(0.0),
-        // Not `clamp`, which panics where an impulse that overflowed makes the limit NaN.
+        // Not `clamp`, which panics if an overflowed impulse makes the limit NaN.
         tangent - (tangent - rho[1] * velocity[1]).max(-limit).min(limit),
     ]
 }
@@ -178,7 +177,7 @@ pub(super) mod tests {
 
     #[test]
     fn what_obeys_the_law_has_no_residual() {
-        // Rest, sliding to the tangent's +x with full friction, leaving, closing a gap.
+        // Rest, sliding along the tangent's +x with full friction, leaving, closing a gap.
         assert_eq!(residual(point(0.0, [3.0, 1.0]), DVec2::ZERO, DVec2::ZERO), [0.0; 2]);
         assert_eq!(residual(point(-0.1, [3.0, -1.5]), DVec2::X, DVec2::X), [0.0; 2]);
         assert_eq!(residual(point(0.0, [0.0, 0.0]), DVec2::ZERO, DVec2::ONE), [0.0; 2]);

@@ -11,10 +11,10 @@
 //! | law residual | how far the impulses are from Signorini's and Coulomb's law | [`law`] |
 //! | complementarity, cone, dissipation | which part of the law is violated | [`violation`] |
 //! | own residual | how far the solver is from its own law | [`own`] |
-//! | momentum, angular momentum | whether impulses come in pairs | [`balance`] |
+//! | momentum, angular momentum | whether impulses come in opposite pairs | [`balance`] |
 //! | energy | energy gained or lost, and where it went | [`balance`], [`state`] |
 //! | rest velocity, creep, settle time | whether bodies that should rest do | [`rest`] |
-//! | gap, lean, excess, residual, work of joints | how well joints hold, and what they give | [`mod@joints`] |
+//! | gap, lean, excess, residual, work of joints | how well joints hold, and their work | [`mod@joints`] |
 //! | velocity error | how far velocities are from a reference | [`velocity`] |
 //!
 //! A run that blows up ([`Observation::blown_up`]) has failed, and has no errors.
@@ -70,8 +70,8 @@ use state::BodyState;
 use std::collections::BTreeMap;
 use violation::Violation;
 
-/// The errors of a run. All are finite, and zero where there is nothing to measure; absent is
-/// what was not requested, or has no meaning.
+/// The errors of a run. All are finite, and zero if there is nothing to measure. An error is `None` if it was
+/// not requested or has no meaning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Errors {
     /// Steps observed.
@@ -81,141 +81,144 @@ pub struct Errors {
     /// Deepest overlap (m).
     #[serde(rename = "penetration_max_m")]
     pub penetration_max: f64,
-    /// Mean overlap of such points; open ones count as zero (m).
+    /// Mean overlap of these points; gaps count as zero (m).
     #[serde(rename = "penetration_mean_m")]
     pub penetration_mean: f64,
-    /// Root mean square of the same (m).
+    /// Root mean square of these overlaps (m).
     #[serde(rename = "penetration_rms_m")]
     pub penetration_rms: f64,
-    /// 99th percentile over such points (m).
+    /// 99th percentile of these overlaps (m).
     #[serde(rename = "penetration_p99_m")]
     pub penetration_p99: f64,
-    /// Largest overlap at the end of a step of bodies that had no contact before (m): no solver saw them.
+    /// Largest overlap at the end of a step between bodies that had no contact in it (m): no solver could
+    /// prevent it.
     #[serde(rename = "flight_depth_max_m")]
     pub flight_depth_max: f64,
-    /// 99th percentile of penetration beyond the depth at which contacts were found (m).
+    /// 99th percentile of the overlap beyond the depth at which its contact was first found (m).
     #[serde(rename = "held_depth_p99_m")]
     pub held_depth_p99: f64,
     /// Deepest overlap of the last second (m).
     #[serde(rename = "rest_depth_max_m")]
     pub rest_depth_max: f64,
-    /// Deepest overlap, in half the width of the thinnest dynamic shape.
+    /// Deepest overlap, as a fraction of half the width of the thinnest dynamic shape.
     pub penetration_relative: f64,
-    /// Deepest overlap of the last second beyond the static deflection of the soft contacts (m); none without soft
-    /// contacts.
+    /// Deepest overlap of the last second beyond the static deflection of the soft contacts (m); `None`
+    /// without soft contacts.
     #[serde(rename = "penetration_excess_m")]
     pub penetration_excess: Option<f64>,
-    /// The most that soft contacts give way under the last second's load (m).
+    /// Largest static deflection of soft contacts under the load of the last second (m).
     #[serde(rename = "soft_floor_m")]
     pub soft_floor: Option<f64>,
-    /// Normal law residual, root mean square, in the weight of the scene × step.
+    /// Root mean square of the normal law residual, as a multiple of scene weight × step.
     #[serde(rename = "residual_normal_rms")]
     pub law_normal_rms: f64,
     /// Largest normal law residual.
     #[serde(rename = "residual_normal_max")]
     pub law_normal_max: f64,
-    /// Tangential law residual, root mean square.
+    /// Root mean square of the tangential law residual.
     #[serde(rename = "residual_tangent_rms")]
     pub law_tangent_rms: f64,
     /// Largest tangential law residual.
     #[serde(rename = "residual_tangent_max")]
     pub law_tangent_max: f64,
-    /// Both parts together, root mean square. At equal quality it falls with the number of bodies.
+    /// Root mean square of both parts together. At equal quality it falls with the number of bodies.
     #[serde(rename = "residual_rms_scene_weights")]
     pub law_rms: f64,
-    /// The same in the mean weight of a body × step, which does not.
+    /// The same as a multiple of a body's mean weight × step, which does not fall with the number of bodies.
     #[serde(rename = "residual_rms_body_weights")]
     pub law_rms_body: f64,
-    /// Both parts together, each point's in the weight of the lighter of its two bodies × step, root mean square.
+    /// Root mean square of both parts together, each point's residual as a multiple of the weight of the
+    /// lighter of its two bodies × step.
     #[serde(rename = "residual_rms_lighter_weights")]
     pub law_rms_lighter: f64,
-    /// Largest violation of complementarity, in (weight × step)²/mass.
+    /// Largest violation of complementarity, as a multiple of (weight × step)²/mass.
     pub complementarity: f64,
-    /// Largest violation of the friction cone, in weight × step.
+    /// Largest violation of the friction cone, as a multiple of weight × step.
     pub cone: f64,
-    /// Largest gap to maximal dissipation, in (weight × step)²/mass.
+    /// Largest gap to maximal dissipation, as a multiple of (weight × step)²/mass.
     pub dissipation: f64,
-    /// Residual of what the solver set out to solve, both parts, root mean square, in the
-    /// weight of the scene × substep; only with `Settings::observe_rule`.
+    /// Root mean square of the residual of the solver's own law, both parts, as a multiple of scene weight ×
+    /// substep; only with `Settings::observe_rule`.
     #[serde(rename = "own_residual_rms")]
     pub own_rms: Option<f64>,
-    /// Largest of its normal and tangential parts.
+    /// Largest normal or tangential part of that residual.
     #[serde(rename = "own_residual_max")]
     pub own_max: Option<f64>,
-    /// Momentum out of balance, see [`Balance::close`].
+    /// Momentum imbalance, see [`Balance::close`].
     pub momentum: f64,
-    /// Angular momentum out of balance.
+    /// Angular momentum imbalance.
     pub angular_momentum: f64,
     /// Energy gained (positive) or lost over the run.
     pub energy_change: f64,
-    /// Most energy created in one step.
+    /// Largest energy created in one step.
     pub energy_created: f64,
-    /// Energy that springs and motors of joints gave over the run; none without joints.
+    /// Energy that springs and motors of joints gave over the run; `None` without joints.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub joint_work: Option<f64>,
-    /// Largest gap of a joint (m); none without joints.
+    /// Largest gap of a joint (m); `None` without joints.
     #[serde(rename = "joint_gap_max_m", skip_serializing_if = "Option::is_none", default)]
     pub joint_gap_max: Option<f64>,
     /// Root mean square of the gaps of all joints and steps (m).
     #[serde(rename = "joint_gap_rms_m", skip_serializing_if = "Option::is_none", default)]
     pub joint_gap_rms: Option<f64>,
-    /// Largest error of an angle that a joint holds (rad).
+    /// Largest error of an angle that is held by a joint (rad).
     #[serde(rename = "joint_lean_max_rad", skip_serializing_if = "Option::is_none", default)]
     pub joint_lean_max: Option<f64>,
     /// Largest violation of a joint's limits (m or rad).
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub joint_excess_max: Option<f64>,
-    /// Law residual of rows of joints, root mean square, in the weight of the lighter body × step; see [`joints`].
+    /// Root mean square of the law residual of joint rows, as a multiple of the lighter body's weight × step;
+    /// see [`joints`].
     #[serde(rename = "joint_residual_rms_lighter_weights", skip_serializing_if = "Option::is_none", default)]
     pub joint_law_rms: Option<f64>,
-    /// Largest of them.
+    /// Largest law residual of a joint row.
     #[serde(rename = "joint_residual_max_lighter_weights", skip_serializing_if = "Option::is_none", default)]
     pub joint_law_max: Option<f64>,
-    /// Largest speed that a motor misses although its impulse is below its cap (m/s or rad/s).
+    /// Largest speed error of a motor whose impulse is below its cap (m/s or rad/s).
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub joint_motor_miss_max: Option<f64>,
-    /// Largest share of its cap that a motor used.
+    /// Largest fraction of its cap that a motor used.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub joint_motor_load_max: Option<f64>,
-    /// Energy that springs gave over the run; negative if they took it.
+    /// Energy that springs gave over the run; negative if they removed energy.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub joint_spring_work: Option<f64>,
     /// Energy that motors gave over the run.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub joint_motor_work: Option<f64>,
-    /// Energy that limits gave over the run: negative where bodies hit them.
+    /// Energy that limits gave over the run; negative if they stopped bodies.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub joint_limit_work: Option<f64>,
-    /// Energy that friction took.
+    /// Energy dissipated by friction.
     pub friction_loss: f64,
-    /// Energy that normal impulses took.
+    /// Energy dissipated by normal impulses.
     pub impact_loss: f64,
-    /// Most energy in one step that no impulse explains.
+    /// Largest energy gain of one step that no impulse explains.
     pub energy_unexplained: f64,
     /// Root mean square of √(2 E_kin/M) over the last second (m/s).
     #[serde(rename = "rest_speed_m_s")]
     pub rest_velocity: f64,
-    /// Fastest creep of one body on another over the last second, without its sign (m/s).
+    /// Magnitude of the fastest creep of one body on another over the last second (m/s).
     #[serde(rename = "creep_m_s")]
     pub creep: f64,
-    /// Half the width of its 95 % interval (m/s).
+    /// Half the width of the 95 % interval of the creep (m/s).
     #[serde(rename = "creep_half_width_m_s")]
     pub creep_half_width: f64,
-    /// Time at which the scene came to rest (s); none if it never did.
+    /// Time at which the scene came to rest (s); `None` if it never did.
     #[serde(rename = "settled_s")]
     pub settled: Option<f64>,
 }
 
 impl Errors {
-    /// The penetration that is judged (m): what 99 % of the points of contacts keep, and where a scene has to
-    /// rest, also the deepest of its last second.
+    /// The penetration by which a run is judged (m): [`Self::held_depth_p99`], or, in a scene that must come
+    /// to rest, the larger of it and [`Self::rest_depth_max`].
     pub fn penetration(&self, rests: bool) -> f64 {
         if rests { self.held_depth_p99.max(self.rest_depth_max) } else { self.held_depth_p99 }
     }
 }
 
-/// Overlap from flight counts in full after this time (s): in 30 steps a Baumgarte feedback of a fifth per step
-/// leaves a thousandth of it.
+/// Time after which an overlap from flight counts in full (s): in 30 steps, a Baumgarte feedback of a fifth
+/// per step reduces it to a thousandth.
 const FLIGHT: f64 = 0.5;
 
 /// Root mean square and maximum of residuals (N·s).
@@ -260,17 +263,17 @@ pub struct Observation {
     half_extent: f64,
     dt: f64,
     weight: f64,
-    /// Dynamic bodies that have weight.
+    /// Number of dynamic bodies with weight.
     heavy: usize,
     steps: u64,
     overlaps: Overlaps,
     penetration: Distribution,
     normal: Residuals,
     tangent: Residuals,
-    /// In the weight of the lighter body × step (1).
+    /// Residuals as multiples of the lighter body's weight × step (1).
     lighter: Residuals,
     held: Distribution,
-    /// Overlaps from flight, without a contact before: depth (m) and step, by pair of shapes.
+    /// Overlaps from flight, first found without a contact: depth (m) and step, by shape pair.
     flights: BTreeMap<u64, (f64, u64)>,
     flight_max: f64,
     own: [Residuals; 2],
@@ -286,7 +289,7 @@ pub struct Observation {
 }
 
 impl Observation {
-    /// Starts an observation of the world in its present state.
+    /// Starts an observation of the world in its current state.
     pub fn new(world: &World) -> Self {
         let settings = &world.settings;
         let previous = snapshot(world);
@@ -368,17 +371,17 @@ impl Observation {
         self.steps += 1;
     }
 
-    /// The first step whose kinetic energy had no source ([`Balance::is_blown_up`]), with the
-    /// fastest body: as much a failure as a speed out of all bounds.
+    /// The first step whose kinetic energy had no source ([`Balance::is_blown_up`]), with the fastest body.
+    /// It is a failure like a speed out of bounds.
     pub fn blown_up(&self) -> Option<Divergence> {
         self.blown_up
     }
 
-    /// Finds what overlaps where bodies are now: bodies that met within the step had no contact.
+    /// Finds overlaps at the current positions: bodies that met within the step had no contact.
     fn add_penetrations(&mut self, world: &World, points: &[([usize; 2], PointStep)]) {
         let (mut depths, mut found) = (Depths::default(), Vec::new());
         self.find_flights(world);
-        // Pairs and contacts ascend alike.
+        // Pairs and contacts are sorted by the same key.
         let (mut contacts, mut steps) = (world.contacts.iter().peekable(), points);
         self.overlaps.find(world, |[a, b], manifold| {
             while let Some(contact) = contacts.next_if(|c| c.key() < pair_key(a, b)) {
@@ -403,14 +406,14 @@ impl Observation {
         self.depths.add(depths, self.dt);
     }
 
-    /// Forgets what flew into each other long ago, and finds what overlaps before the first step: solvers have
-    /// [`FLIGHT`] to push it out.
+    /// Drops flights older than [`FLIGHT`], and records overlaps at the start: solvers have that time to
+    /// remove them.
     fn find_flights(&mut self, world: &World) {
         let steps = (FLIGHT / self.dt).ceil() as u64;
         self.flights.retain(|_, (_, step)| self.steps < *step + steps);
         if self.steps == 0 {
             for contact in &world.contacts {
-                // Gaps of the first step are those of the start.
+                // The gaps of the first step are those at the start.
                 let depth = contact.manifold.points().iter().map(|p| -p.separation).fold(0.0, f32::max);
                 if depth > 0.0 {
                     self.flights.insert(contact.key(), (f64::from(depth), 0));
@@ -419,7 +422,7 @@ impl Observation {
         }
     }
 
-    /// A point of a pair that was no contact in this step: the depth of the pair (m).
+    /// Records a point of a pair that had no contact in this step; returns its depth (m).
     fn fly(&mut self, key: u64, depth: f64) -> f64 {
         self.flight_max = self.flight_max.max(depth);
         let flight = self.flights.entry(key).or_insert((0.0, self.steps));
@@ -427,7 +430,7 @@ impl Observation {
         depth
     }
 
-    /// Static deflection of the soft contact at this feature under its load of the step (m).
+    /// Static deflection of the soft contact at this feature under its load in this step (m).
     fn floor(&self, world: &World, contact: &Contact, own: &[([usize; 2], PointStep)], feature: u32) -> f64 {
         let Some(softness) = self.softness else { return 0.0 };
         let loaded = contact.manifold.points().iter().zip(own).find(|(p, _)| p.feature_id == feature);
@@ -439,8 +442,8 @@ impl Observation {
 
     /// The errors of the steps so far.
     ///
-    /// Residuals are in units of Σ m g Δt, the impulse that carries the whole scene for a
-    /// step; without gravity, of the largest impulse of any point.
+    /// Residuals are relative to Σ m g Δt, the impulse that carries the whole scene for a step; without
+    /// gravity, to the largest impulse of any point.
     pub fn errors(&self) -> Errors {
         let unit = if self.weight > 0.0 { self.weight * self.dt } else { self.largest_impulse };
         let energy_unit = ratio(unit * unit, self.balance.mass());
@@ -510,7 +513,7 @@ impl Observation {
     }
 }
 
-/// The fastest body, as what a run failed by.
+/// The fastest body, as the divergence of a run that blew up.
 fn fastest(bodies: &[BodyState], step: u64) -> Divergence {
     let speeds = bodies
         .iter()
@@ -520,7 +523,7 @@ fn fastest(bodies: &[BodyState], step: u64) -> Divergence {
     Divergence { step, body: i / 2, quantity, speed: speed as f32, criterion: Criterion::Energy }
 }
 
-/// Every body in double precision.
+/// State of every body in double precision.
 fn snapshot(world: &World) -> Vec<BodyState> {
     let gravity = DVec2::from(world.settings.gravity.map(f64::from));
     (0..world.bodies.len()).map(|i| BodyState::of(&world.bodies, i, gravity)).collect()

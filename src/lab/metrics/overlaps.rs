@@ -1,5 +1,5 @@
-//! Shapes that overlap or nearly do, wherever bodies are now: pairs are searched again, whatever
-//! contacts the world knows of. Bodies that meet within a step overlap before there is a contact.
+//! Shapes that overlap or nearly do at the current positions. Pairs are searched again, independently of the
+//! world's contacts: bodies that meet within a step overlap before they have a contact.
 
 use crate::engine::broadphase::{BroadPhase, BroadPhaseKind, Proxy};
 use crate::engine::contacts::Manifold;
@@ -19,18 +19,19 @@ pub struct Overlaps {
 
 impl Default for Overlaps {
     fn default() -> Self {
-        // Rebuilt from nothing in every call: it never depends on what was seen before.
+        // Rebuilt in every call, so that results do not depend on earlier calls.
         let broadphase = BroadPhase::new(BroadPhaseKind::HashGrid);
         Overlaps { broadphase, proxies: Vec::new(), pairs: Vec::new() }
     }
 }
 
 impl Overlaps {
-    /// Calls `each` with every pair of shapes that is as near as a contact, in a contact's order (the
-    /// second is that of a dynamic body; no joint keeps them apart) and ascending by [pair](crate::engine::contacts::pair_key).
+    /// Calls `each` with every pair of shapes within contact distance, ascending by
+    /// [pair](crate::engine::contacts::pair_key). The order in a pair is that of a contact: the second shape
+    /// is that of a dynamic body. Pairs that a joint keeps apart are left out.
     pub fn find(&mut self, world: &World, mut each: impl FnMut([u32; 2], &Manifold)) {
         let (bodies, near) = (&world.bodies, SPECULATIVE_DISTANCE * world.settings.length_unit);
-        // Bounds are relative to the first body: far from the origin they would round.
+        // Bounds are relative to the first body: far from the origin they would lose precision.
         let origin = if bodies.is_empty() { DVec2::ZERO } else { DVec2::from(bodies.center(0)) };
         let proxy = |(shape, &body): (&crate::engine::shapes::Shape, &u32)| {
             let i = body as usize;

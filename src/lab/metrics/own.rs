@@ -1,15 +1,15 @@
 //! The residual of a solver's own law: a second residual, never mixed with that of the [rigid law](super::law).
 //!
-//! A solver may solve another law than the rigid one on purpose: with a bias velocity that recovers overlap, or with
-//! soft contacts. Its last velocity sweep then solves
+//! A solver may solve a law other than the rigid one on purpose: with a bias velocity that removes overlap,
+//! or with soft contacts. Its last velocity sweep then solves
 //!
 //! ```text
 //! 0 ≤ λ_n ⊥ J v⁺ + b + c λ_n ≥ 0
 //! ```
 //!
-//! for the impulses of the last substep, with the bias b and the compliance c that its rule answers with when it is
-//! [asked](crate::engine::constraints::kernels::observe). The residual is the natural map of that, with ρ_n = 1/(J
-//! M⁻¹ Jᵀ + c). If it is small while the rigid residual is large, more sweeps do not help.
+//! for the impulses of the last substep, with the bias b and the compliance c of its [observed
+//! rule](crate::engine::constraints::kernels::observe). The residual is the natural map of this law, with ρ_n
+//! = 1/(J M⁻¹ Jᵀ + c). If it is small while the rigid residual is large, more sweeps do not help.
 //!
 //! Not measured: steps in which a contact may bounce, since bounces come after the last sweep, and solvers that do
 //! not end with a velocity sweep.
@@ -19,8 +19,7 @@ use crate::engine::bodies::BodyKind;
 use crate::engine::constraints::kernels::observe::{NormalLaw, ObservedRule};
 use crate::engine::world::World;
 
-/// Bias of a row that its rule does not answer to (m/s): no body is as fast, so that its
-/// impulse must be zero.
+/// Bias of a row that the rule does not solve (m/s): no body is this fast, so its impulse must be zero.
 const OUT_OF_REACH: f64 = 1e30;
 
 impl PointStep {
@@ -37,7 +36,7 @@ impl PointStep {
     }
 }
 
-/// The own residuals of every point of the last step (N·s); empty where there is no own law.
+/// The own residuals of every point of the last step (N·s); empty if there is no own law.
 pub(super) fn residuals(
     world: &World,
     bodies: &[BodyStep],
@@ -85,9 +84,9 @@ mod tests {
 
     #[test]
     fn the_own_law_is_obeyed_where_the_rigid_one_is_not() {
-        // Pushed apart with 0.5 m/s, the target of its bias.
+        // Pushed apart at 0.5 m/s, the target of the bias.
         assert_eq!(own([3.0, 0.0], 0.5 * DVec2::Y, -0.5, 0.0), [0.0; 2]);
-        // A spring that takes 3 N·s has 1/4 kg⁻¹ × 3 N·s = 0.75 m/s to give.
+        // A spring with 3 N·s gives way at 1/4 kg⁻¹ × 3 N·s = 0.75 m/s.
         assert_eq!(own([3.0, 0.0], 0.25 * DVec2::Y, -1.0, 0.25), [0.0; 2]);
         // Out of reach there is no impulse.
         assert_eq!(own([0.0, 0.0], DVec2::NEG_Y, OUT_OF_REACH, 0.0), [0.0; 2]);
@@ -95,7 +94,7 @@ mod tests {
 
     #[test]
     fn what_breaks_it_does_by_a_known_impulse() {
-        // 2 kg that should leave with 0.5 m/s and stand; and a push that was not wanted.
+        // 2 kg that should leave at 0.5 m/s and stand still; and an impulse that must be zero.
         assert_eq!(own([3.0, 0.0], DVec2::ZERO, -0.5, 0.0), [-1.0, 0.0]);
         assert_eq!(own([3.0, 0.0], DVec2::ZERO, OUT_OF_REACH, 0.0)[0], 3.0);
         // Compliance halves the mass: ρ = 1/(1/2 + 1/2) kg times 1.5 m/s.

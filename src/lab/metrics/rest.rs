@@ -5,13 +5,13 @@ use super::state::BodyState;
 use glam::DVec2;
 use std::collections::VecDeque;
 
-/// Rest and creep are judged over this long at the end of a run (s).
+/// Length of the window at the end of a run in which rest and creep are measured (s).
 pub const REST_WINDOW: f64 = 1.0;
 
-/// A scene whose √(E_kin/M) stays below this has settled (m/s).
+/// A scene has settled if its √(E_kin/M) stays below this (m/s).
 pub const SETTLED_SPEED: f64 = 1e-3;
 
-/// It must stay below for this long (s).
+/// Time for which it must stay below [`SETTLED_SPEED`] (s).
 pub const SETTLED_FOR: f64 = 1.0;
 
 /// A speed with its uncertainty.
@@ -23,7 +23,7 @@ pub struct Slope {
     pub half_width: f64,
 }
 
-/// The least-squares slope of `values` (m) at equal distances `dt` (s); none of fewer than three.
+/// The least-squares slope of `values` (m) at intervals of `dt` (s); `None` for fewer than three values.
 ///
 /// With t̄ the middle of the times t_i and n values,
 ///
@@ -31,8 +31,8 @@ pub struct Slope {
 /// b = Σ (t_i − t̄) y_i / Σ (t_i − t̄)²,   s_b² = Σ (y_i − fit)² / ((n − 2) Σ (t_i − t̄)²)
 /// ```
 ///
-/// and the interval is b ± t_{0.975, n−2} s_b. It takes residuals for independent; where
-/// they are waves longer than a step it is too narrow.
+/// and the interval is b ± t_{0.975, n−2} s_b. It assumes independent residuals; if they are waves longer
+/// than a step, it is too narrow.
 pub fn slope(values: &[f64], dt: f64) -> Option<Slope> {
     let n = values.len();
     if n < 3 {
@@ -48,9 +48,8 @@ pub fn slope(values: &[f64], dt: f64) -> Option<Slope> {
     Some(Slope { speed, half_width: student_975(n - 2) * deviation })
 }
 
-/// The 97.5 % quantile of Student's distribution with ν degrees of freedom: for ν ≤ 4 from
-/// the exact distribution, above by the Cornish–Fisher expansion in 1/ν, which is off by less
-/// than 0.3 % at ν = 5.
+/// The 97.5 % quantile of Student's distribution with ν degrees of freedom: exact for ν ≤ 4, otherwise by the
+/// Cornish–Fisher expansion in 1/ν, whose error is below 0.3 % at ν = 5.
 fn student_975(nu: usize) -> f64 {
     const FEW: [f64; 4] = [12.7062, 4.3027, 3.1824, 2.7764];
     if let Some(&known) = nu.checked_sub(1).and_then(|i| FEW.get(i)) {
@@ -63,12 +62,12 @@ fn student_975(nu: usize) -> f64 {
     z + first / nu + second / nu.powi(2) + third / nu.powi(3)
 }
 
-/// Watches speeds and positions.
+/// Tracks speeds and positions.
 #[derive(Clone, Debug)]
 pub struct Rest {
     dt: f64,
     steps: u64,
-    /// 2 E_kin/M, the last [`REST_WINDOW`] of them (m²/s²).
+    /// 2 E_kin/M over the last [`REST_WINDOW`] (m²/s²).
     speeds: VecDeque<f64>,
     /// Centers of mass in the same window (m).
     positions: VecDeque<Vec<DVec2>>,
@@ -80,7 +79,7 @@ pub struct Rest {
 }
 
 impl Rest {
-    /// For steps of `dt` (s).
+    /// A tracker for steps of `dt` (s).
     pub fn new(dt: f64) -> Self {
         Rest {
             dt,
@@ -93,7 +92,7 @@ impl Rest {
         }
     }
 
-    /// Adds a step's end: 2 E_kin/M (m²/s²), bodies, contact points.
+    /// Adds the end of a step: 2 E_kin/M (m²/s²), bodies, contact points.
     pub fn add(&mut self, square: f64, bodies: &[BodyState], points: &[([usize; 2], PointStep)]) {
         self.steps += 1;
         self.speeds.push_back(square);
@@ -105,7 +104,7 @@ impl Rest {
         let pressing = points.iter().filter(|(_, p)| p.impulse[0] > 0.0);
         self.touching.clear();
         self.touching.extend(pressing.map(|&(bodies, p)| (bodies, tangent(p.normal))));
-        // Both points of a manifold say the same.
+        // Both points of a manifold give the same entry.
         self.touching.dedup();
 
         if 0.5 * square >= SETTLED_SPEED.powi(2) {
@@ -129,9 +128,9 @@ impl Rest {
         self.settled
     }
 
-    /// The fastest of all slopes of a center of mass against that of a body it presses on, along the tangent of their
-    /// contact; of those that press on each other at the end. Bodies that roll or slide on purpose count as creeping,
-    /// too.
+    /// The fastest creep: the slope of a center of mass relative to that of a body it presses on, along the
+    /// tangent of their contact, among bodies that press on each other at the end. Bodies that roll or slide
+    /// on purpose count as creeping, too.
     pub fn creep(&self) -> Slope {
         let slopes = self.touching.iter().filter_map(|&([a, b], tangent)| {
             let along: Vec<f64> = self.positions.iter().map(|x| (x[b] - x[a]).dot(tangent)).collect();

@@ -8,15 +8,15 @@
 //! ```
 //!
 //! whatever the damping and the number of sweeps. A solver with such contacts declares them in its
-//! [row](crate::engine::solvers::Variant::softness). The formula is for rest: in an impact the impulse of a step is
-//! no load. So floor and excess are those of the last [`REST_WINDOW`], and the floor is meaningless for a run whose
-//! bodies still fall then.
+//! [row](crate::engine::solvers::Variant::softness). The formula holds at rest: in an impact, the impulse of
+//! a step is not a load. Floor and excess are therefore those of the last [`REST_WINDOW`], and the floor is
+//! meaningless if bodies still fall then.
 
 use super::rest::REST_WINDOW;
 use std::collections::VecDeque;
 
 /// s = F/(m ω²) (m): load (N), effective mass (kg), angular frequency (rad/s).
-/// Zero where nothing can move.
+/// Zero if nothing can move.
 pub fn floor(load: f64, mass: f64, omega: f64) -> f64 {
     let stiffness = mass * omega * omega;
     if stiffness > 0.0 { load.max(0.0) / stiffness } else { 0.0 }
@@ -57,7 +57,7 @@ impl RestDepths {
         }
     }
 
-    /// The largest of each.
+    /// The largest value of each.
     pub fn largest(&self) -> Depths {
         self.steps.iter().fold(Depths::default(), |worst, d| Depths {
             penetration: worst.penetration.max(d.penetration),

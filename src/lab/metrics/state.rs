@@ -1,4 +1,4 @@
-//! The state of a body in double precision, and what can be summed over it.
+//! The state of a body in double precision, and quantities computed from it.
 
 use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::world::World;
@@ -29,7 +29,7 @@ pub struct BodyState {
 }
 
 impl BodyState {
-    /// Body `i` under `gravity` (m/s²), masses as the simulation has them.
+    /// Body `i` under `gravity` (m/s²), with the masses that the simulation uses.
     pub fn of(bodies: &Bodies, i: usize, gravity: DVec2) -> Self {
         let wide = |v: Vec2| v.as_dvec2();
         let pose = bodies.pose(i);
@@ -75,8 +75,8 @@ impl BodyState {
     }
 }
 
-/// Change of the shadow energy of a body over a step of constant force (J), without the
-/// energy that left or entered through contacts it is zero.
+/// Change of the shadow energy of a body over a step of constant force (J). It is zero if no energy leaves or
+/// enters through contacts.
 ///
 /// Semi-implicit Euler with substep h, v' = v + h F/m, x' = x + h v', does not conserve
 /// E = ½ m v² − F·x in free fall: E' − E = −½ h² F²/m per substep. It conserves
@@ -86,9 +86,8 @@ impl BodyState {
 /// Ẽ' − Ẽ = h F·v + ½ h² F²/m − h F·(v + h F/m) + ½ h F·(h F/m) = 0
 /// ```
 ///
-/// and with an impulse P in the substep, v' = v + h F/m + P/m, the same terms leave
-/// Ẽ' − Ẽ = P·(v + v')/2: the work of the impulse, exactly. The turn adds the same in
-/// I, ω, θ and the torque.
+/// and with an impulse P in the substep, v' = v + h F/m + P/m, the same terms leave Ẽ' − Ẽ = P·(v + v')/2:
+/// the work of the impulse, exactly. Rotation adds the same terms in I, ω, θ and the torque.
 pub fn shadow_energy_change(before: &BodyState, after: &BodyState, h: f64) -> f64 {
     let (force, torque) = (after.force, after.torque);
     after.kinetic_energy() - before.kinetic_energy() - force.dot(after.position - before.position)
@@ -97,8 +96,7 @@ pub fn shadow_energy_change(before: &BodyState, after: &BodyState, h: f64) -> f6
         + 0.5 * h * torque * (after.angular_velocity - before.angular_velocity)
 }
 
-/// Angles of bodies since the start, however many turns they have made; a rotation alone tells an
-/// angle but for whole turns.
+/// Angles of bodies since the start, including full turns, which a rotation alone does not contain.
 #[derive(Clone, Debug)]
 pub struct Angles {
     dt: f64,
@@ -109,7 +107,7 @@ pub struct Angles {
 }
 
 impl Angles {
-    /// Begins with these angles (rad), by body; missing ones are zero.
+    /// Starts with these angles (rad), by body; missing ones are zero.
     pub fn new(world: &World, start: impl IntoIterator<Item = f64>) -> Self {
         let last = states(&world.bodies);
         let mut angles: Vec<f64> = start.into_iter().collect();
@@ -117,8 +115,8 @@ impl Angles {
         Angles { dt: world.settings.dt as f64, angles, last }
     }
 
-    /// Adds the step that the world has just taken: of all turns that end in its direction, a body
-    /// has made the one that is nearest to its mean spin.
+    /// Adds the step that the world has just taken. Of all turns that end at its new rotation, a body is
+    /// taken to have made the one nearest to its mean spin.
     pub fn add(&mut self, world: &World) {
         let now = states(&world.bodies);
         let steps = self.last.iter().zip(&now);

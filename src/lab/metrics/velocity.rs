@@ -4,8 +4,8 @@
 //! ‖v‖_M = √(vᵀ M v) = √(Σ m |v|² + I ω²),   e = ‖v − v_ref‖_M / max(‖v_ref‖_M, √M g Δt)
 //! ```
 //!
-//! The second scale is what weight does in one step, so that a scene at rest has an error
-//! and not a quotient of zeros.
+//! The second scale is the effect of weight in one step, so that the error of a scene at rest is not a
+//! quotient of zeros.
 
 use super::balance::{ratio, weight};
 use super::state::BodyState;
@@ -14,22 +14,22 @@ use glam::DVec2;
 /// Linear (m/s) and angular velocity (rad/s) of a body.
 pub type BodyVelocity = (DVec2, f64);
 
-/// √(vᵀ M v) (√J, twice the kinetic energy under the root); `velocities` are one per body.
+/// √(vᵀ M v), the root of twice the kinetic energy (√J); `velocities` has one entry per body.
 pub fn mass_norm(bodies: &[BodyState], velocities: impl IntoIterator<Item = BodyVelocity>) -> f64 {
     let square =
         |(b, (v, w)): (&BodyState, BodyVelocity)| b.mass() * v.length_squared() + b.inertia() * w * w;
     bodies.iter().zip(velocities).map(square).sum::<f64>().sqrt()
 }
 
-/// The relative error e of the bodies' velocities against `reference`, over a step of `dt` (s).
-/// Zero if nothing moves and nothing has weight.
+/// The relative error e of the bodies' velocities to `reference`, over a step of `dt` (s). Zero if nothing
+/// moves and nothing has weight.
 pub fn error(bodies: &[BodyState], reference: &[BodyVelocity], dt: f64) -> f64 {
     let difference = bodies.iter().zip(reference).map(|(b, (v, w))| (b.velocity - v, b.angular_velocity - w));
     let mass: f64 = bodies.iter().map(BodyState::mass).sum();
     let by_weight = ratio(weight(bodies) * dt, mass.sqrt());
     let scale = mass_norm(bodies, reference.iter().copied()).max(by_weight);
     let distance = mass_norm(bodies, difference);
-    // A reference at rest without weight still tells rest from motion.
+    // Without a scale, rest has error 0 and motion has error 1.
     if scale > 0.0 { distance / scale } else { ratio(distance, distance) }
 }
 
@@ -41,7 +41,7 @@ mod tests {
 
     #[test]
     fn the_norm_weighs_motion_and_spin() {
-        // 2 kg × 25 + 0.5 kg·m² × 4² = 58; what is fixed weighs nothing.
+        // 2 kg × 25 + 0.5 kg·m² × 4² = 58; static bodies do not count.
         let bodies = [body(), fixed(BodyKind::Static)];
         let norm = mass_norm(&bodies, [(DVec2::new(3.0, 4.0), 4.0), (DVec2::ONE, 1.0)]);
         assert!((norm - 58.0_f64.sqrt()).abs() < 1e-14);

@@ -1,7 +1,7 @@
-//! The parts of the contact law one by one: which of them is broken, and by how much.
+//! The parts of the contact law one by one: which part is violated, and by how much.
 //!
-//! The [natural map](super::law) vanishes exactly if the law holds, but tells little of what
-//! is wrong where it does not. These tell, in terms of the same impulses and velocities:
+//! The [natural map](super::law) vanishes exactly if the law holds, but does not show which part is violated.
+//! These measures do, from the same impulses and velocities:
 //!
 //! ```text
 //! complementarity   |λ_n u_n|                  pushed although apart, or approaching
@@ -9,25 +9,25 @@
 //! dissipation       max(0, µ λ_n |u_t| + λ_t u_t)
 //! ```
 //!
-//! The last is the principle of maximal dissipation: within the cone friction takes at most
-//! µ λ_n |u_t| and takes −λ_t u_t. The gap is zero if nothing slides or if all of µ λ_n
-//! opposes the slip, and it counts friction that drives the slip twice as much as none.
+//! The last is the principle of maximal dissipation: within the cone, friction can dissipate at most µ λ_n
+//! |u_t|, and it dissipates −λ_t u_t. The gap is zero if nothing slides or if the full µ λ_n opposes the
+//! slip. Full friction that drives the slip counts twice as much as no friction.
 
 use super::law::{BodyStep, PointStep};
 
 /// Violations of the contact law at a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Violation {
-    /// Of complementarity (J).
+    /// Violation of complementarity (J).
     pub complementarity: f64,
-    /// Of the friction cone (N·s).
+    /// Violation of the friction cone (N·s).
     pub cone: f64,
-    /// Of maximal dissipation (J).
+    /// Violation of maximal dissipation (J).
     pub dissipation: f64,
 }
 
 impl Violation {
-    /// The larger one of each.
+    /// The larger value of each.
     pub fn max(self, other: Violation) -> Violation {
         Violation {
             complementarity: self.complementarity.max(other.complementarity),
@@ -65,7 +65,7 @@ mod tests {
     fn what_obeys_the_law_violates_nothing() {
         assert_eq!(violation([3.0, 1.0], DVec2::ZERO), [0.0; 3]);
         assert_eq!(violation([0.0, 0.0], DVec2::new(1.0, 2.0)), [0.0; 3]);
-        // Sliding along the tangent with all the friction there is: µ λ_n = 1.5.
+        // Sliding along the tangent with full friction: µ λ_n = 1.5.
         assert_eq!(violation([3.0, -1.5], DVec2::X), [0.0; 3]);
     }
 
@@ -74,10 +74,10 @@ mod tests {
         // Leaving at 0.5 m/s and sinking at 0.25 m/s, pushed with 3 N·s.
         assert_eq!(violation([3.0, 0.0], 0.5 * DVec2::Y)[0], 1.5);
         assert_eq!(violation([3.0, 0.0], -0.25 * DVec2::Y)[0], 0.75);
-        // 2 N·s of friction where 1.5 are allowed, and where nothing presses.
+        // 2 N·s of friction where 1.5 are allowed, and without a normal impulse.
         assert_eq!(violation([3.0, -2.0], DVec2::ZERO), [0.0, 0.5, 0.0]);
         assert_eq!(violation([0.0, -2.0], DVec2::ZERO)[1], 2.0);
-        // Slides at 2 m/s: 3 J could be taken. None is; a third is; as much is given.
+        // Sliding at 2 m/s: 3 J could be dissipated. None is; a third is; the same amount is added.
         assert_eq!(violation([3.0, 0.0], 2.0 * DVec2::X)[2], 3.0);
         assert_eq!(violation([3.0, -0.5], 2.0 * DVec2::X)[2], 2.0);
         assert_eq!(violation([3.0, 1.5], 2.0 * DVec2::X)[2], 6.0);

@@ -1,21 +1,21 @@
-//! What the pictures share: logarithmic scales, panels with ticks, text, markers, colors.
+//! Parts shared by the plots: logarithmic scales, panels with ticks, text, markers, colors.
 //!
-//! Axes are drawn here and not by the chart builder, so that a panel of any range has
-//! readable ticks within tight limits.
+//! Axes are drawn here instead of by the chart builder, so that a panel of any range has readable ticks
+//! within tight limits.
 
 pub use crate::lab::units::wrapped;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-/// Where is drawn.
+/// Drawing area of the chart library.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-/// What the chart library returns.
+/// Result type of the chart library.
 pub type Drawn = Result<(), Box<dyn std::error::Error>>;
 
-/// Of text and frames.
+/// Color of text and frames.
 pub const INK: RGBColor = RGBColor(40, 40, 40);
-/// Of lines at ticks.
+/// Color of grid lines at ticks.
 pub const GRID: RGBColor = RGBColor(222, 222, 222);
 /// Distinct with any color vision (Okabe and Ito).
 const COLORS: [RGBColor; 8] = [
@@ -29,7 +29,7 @@ const COLORS: [RGBColor; 8] = [
     RGBColor(160, 160, 40),
 ];
 
-/// The color of the curve at this index, where curves are no solvers.
+/// The color of the curve at this index, for curves that are not solvers.
 pub fn color(curve: usize) -> RGBColor {
     COLORS[curve % COLORS.len()]
 }
@@ -39,18 +39,18 @@ pub fn color(curve: usize) -> RGBColor {
 pub struct LogScale {
     /// Lower and upper limit.
     pub limits: [f64; 2],
-    /// Where it has labels, within the limits.
+    /// Labeled ticks, within the limits.
     pub ticks: Vec<f64>,
 }
 
-/// Least range of an axis: limits this factor apart.
+/// Minimum range of an axis: upper ÷ lower limit.
 const LEAST_RANGE: f64 = 1.3;
 
 impl LogScale {
-    /// An axis that holds the values with a little room, at most `most` ticks on it.
+    /// An axis that contains the values with some margin and has at most `most` ticks.
     ///
-    /// Ticks are the coarsest of decades, 1-2-5, single digits and so on that has at least two
-    /// within the limits; if those are too many, every second or third.
+    /// Ticks are at decades, 1-2-5, single digits and so on: the coarsest of these with at least two ticks
+    /// within the limits. If there are too many, only every second, third or later one is kept.
     pub fn of(values: impl Iterator<Item = f64> + Clone, most: usize) -> LogScale {
         let least = values.clone().fold(f64::INFINITY, f64::min).clamp(1e-12, 1e12);
         let largest = values.fold(least, f64::max);
@@ -76,7 +76,7 @@ impl LogScale {
         LogScale { limits, ticks: ticks.into_iter().step_by(stride).collect() }
     }
 
-    /// Where the value is between two pixels.
+    /// Position of the value (pixels), between `from` and `to`.
     pub fn pixel(&self, value: f64, from: i32, to: i32) -> i32 {
         let [low, high] = self.limits;
         from + ((value / low).ln() / (high / low).ln() * (to - from) as f64).round() as i32
@@ -93,8 +93,8 @@ pub struct Edges {
 }
 
 impl Edges {
-    /// Lines at the ticks of a horizontal and a vertical axis, and what `labels` makes of the ticks: below, by
-    /// `gap` pixels, and on the left.
+    /// Draws grid lines at the ticks of the horizontal and the vertical axis, and their labels from `labels`:
+    /// `gap` pixels below, and on the left.
     pub fn grid(
         &self,
         area: &Area,
@@ -124,7 +124,7 @@ pub fn write(area: &Area, text: &str, at: (i32, i32), size: i32, anchor: HPos) -
     Ok(())
 }
 
-/// Text that runs upward, its middle at `at`.
+/// Text that runs upward, centered at `at`.
 pub fn write_upwards(area: &Area, text: &str, at: (i32, i32), size: i32) -> Drawn {
     let font = ("sans-serif", size).into_font().transform(FontTransform::Rotate270);
     let style = font.color(&INK).pos(Pos::new(HPos::Center, VPos::Center));
@@ -132,8 +132,8 @@ pub fn write_upwards(area: &Area, text: &str, at: (i32, i32), size: i32) -> Draw
     Ok(())
 }
 
-/// A picture of the chart library that is dark where its reader's pages are: its paper, ink, grid and the
-/// black of a solver have other colors there.
+/// A plot of the chart library with a dark variant for dark pages: background, ink, grid and the black of a
+/// solver change color there.
 pub fn with_dark(svg: &str) -> String {
     const STYLE: &str = "<style>@media (prefers-color-scheme: dark) {\
         [fill='#FFFFFF'] { fill: #14181d } [fill='#282828'] { fill: #e4e7eb } [stroke='#282828'] { stroke: #cbd2d9 } \
@@ -142,7 +142,7 @@ pub fn with_dark(svg: &str) -> String {
     svg.find('\n').map_or(svg.to_string(), |end| format!("{}{STYLE}{}", &svg[..=end], &svg[end + 1..]))
 }
 
-/// Circle, triangle, square, then crosses.
+/// Draws a marker by the index of the budget: circle, triangle, square, then crosses.
 pub fn marker(area: &Area, (x, y): (i32, i32), budget: usize, color: &RGBColor) -> Drawn {
     let filled = color.filled();
     match budget {

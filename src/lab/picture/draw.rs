@@ -1,5 +1,5 @@
-//! A frame as a picture: shapes, contact points, normals, impulses as arrows, penetration as
-//! color, with a scale bar and a legend.
+//! A frame as a picture: shapes, contact points, normals, impulses as arrows, penetration as color, with a
+//! scale bar and a legend.
 
 use super::frame::{Frame, Stage, TouchPoint};
 use super::outline::{outline, placed};
@@ -13,10 +13,10 @@ const FAINT: Color = Color::rgb(0x616e7c);
 const BORDER: Color = Color::rgb(0x52606d);
 const FIXED: Color = Color::rgb(0xd3d8de);
 const MOVED: Color = Color::rgb(0xd9d2e9);
-/// Blue and green of Okabe and Ito: distinct with any color vision, and from the ramp.
+/// Blue and green of Okabe and Ito: distinct with any color vision, and distinct from the ramp.
 const IMPULSE: Color = Color::rgb(0x0072b2);
 const NORMAL: Color = Color::rgb(0x009e73);
-/// No overlap to the deepest: lightness falls steadily, so that it reads in gray, too.
+/// From no overlap to the deepest. Lightness falls steadily, so that the ramp is readable in gray, too.
 const RAMP: [Color; 5] = [
     Color::rgb(0xf3f5f8),
     Color::rgb(0xfde4a0),
@@ -25,24 +25,24 @@ const RAMP: [Color; 5] = [
     Color::rgb(0x6b1030),
 ];
 
-/// The widest and the narrowest picture (pixels).
+/// Width of the narrowest and the widest picture (pixels).
 pub const WIDTHS: [u32; 2] = [400, 8000];
 const MARGIN: f64 = 28.0;
 const HEADER: f64 = 66.0;
 const LEGEND: f64 = 84.0;
-/// What a row for the marks of joints adds to it.
+/// Additional height for the row of joint marks.
 const JOINTS: f64 = 26.0;
-/// Height over width of the part with the scene, at least and at most.
+/// Smallest and largest height ÷ width of the part with the scene.
 const ASPECT: [f64; 2] = [0.3, 0.95];
 
-/// The color of an overlap, in shares of the deepest of the legend.
+/// The color of an overlap, given as a fraction of the deepest in the legend.
 fn ramp(share: f64) -> Color {
     let place = share.clamp(0.0, 1.0) * (RAMP.len() - 1) as f64;
     let i = (place as usize).min(RAMP.len() - 2);
     RAMP[i].toward(RAMP[i + 1], place - i as f64)
 }
 
-/// The least of 1, 2, 5 × 10ⁿ that is no less than `value`; 0 for 0.
+/// The smallest of 1, 2, 5 × 10ⁿ that is at least `value`; 0 for 0.
 fn round_up(value: f64) -> f64 {
     if value <= 0.0 {
         return 0.0;
@@ -52,7 +52,7 @@ fn round_up(value: f64) -> f64 {
     step.unwrap_or(10.0) * decade
 }
 
-/// The greatest of 1, 2, 5 × 10ⁿ that is no more than `value`; 0 for 0.
+/// The largest of 1, 2, 5 × 10ⁿ that is at most `value`; 0 for 0.
 fn round_down(value: f64) -> f64 {
     let up = round_up(value);
     match up {
@@ -63,7 +63,7 @@ fn round_down(value: f64) -> f64 {
     }
 }
 
-/// From meters on the stage to pixels.
+/// Maps meters on the stage to pixels.
 struct StageView {
     scale: f64,
     left: f64,
@@ -77,7 +77,7 @@ impl StageView {
     }
 }
 
-/// How far each body reaches from its middle (m); without end, if it does not move by impulses.
+/// Distance from each body's center to its farthest point (m); infinite for a body that is not dynamic.
 fn reaches(stage: &Stage) -> Vec<f64> {
     let is_dynamic = |kind: &BodyKind| *kind == BodyKind::Dynamic;
     let mut all: Vec<f64> =
@@ -89,7 +89,7 @@ fn reaches(stage: &Stage) -> Vec<f64> {
     all
 }
 
-/// Lower and upper corner of what moves and of what it hangs on; of everything, where nothing moves.
+/// Lower and upper corner of all moving shapes and of the joints' anchors; of everything, if nothing moves.
 fn bounds(stage: &Stage, outlines: &[Vec<[f64; 2]>], poses: &[[f64; 3]]) -> [[f64; 2]; 2] {
     let moves = |i: usize| stage.kinds[stage.shapes[i].0 as usize] != BodyKind::Static;
     let any = (0..outlines.len()).any(moves);
@@ -113,11 +113,11 @@ fn bounds(stage: &Stage, outlines: &[Vec<[f64; 2]>], poses: &[[f64; 3]]) -> [[f6
     [low.map(|x| x - room), high.map(|x| x + room)]
 }
 
-/// Penetration of the darkest color where nothing else is asked for (m): what begins to be seen at a meter.
+/// Default penetration of the darkest color (m): visible on bodies of one meter.
 pub const DARKEST: f64 = 0.01;
 
-/// The picture of a frame, `width` pixels wide, under a title and a line below it. What overlaps by `darkest` (m) or
-/// more has the darkest color, so that pictures of one scale compare.
+/// The picture of a frame, `width` pixels wide, below a title and a subtitle. An overlap of `darkest` (m) or
+/// more has the darkest color, so pictures with the same scale are comparable.
 pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u32, darkest: f64) -> Picture {
     let outlines: Vec<Vec<[f64; 2]>> = stage
         .shapes
@@ -155,7 +155,7 @@ pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u3
         let title = format!("body {body}, deepest overlap {}", si(depth_of[body], "m"));
         picture.items.push(Item::Polygon { points, fill: Some(fill), stroke, title });
         if let Shape::Circle { center, radius } = shape {
-            // A spoke shows how it turns.
+            // A spoke shows the rotation.
             let spoke = [center, &(*center + glam::Vec2::new(*radius, 0.0))]
                 .map(|v| [f64::from(v.x), f64::from(v.y)]);
             let spoke = placed(&spoke, frame.poses[body]);
@@ -167,11 +167,11 @@ pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u3
         view.at(place)
     });
     let arrow = points(&mut picture, stage, frame, &view, deepest);
-    // Whatever of the ground reaches into them.
+    // Cover shapes that reach into the header or the legend.
     let top = HEADER + height;
     picture.rectangle([0.0, 0.0], [f64::from(width), HEADER - 6.0], Color::rgb(0xffffff));
     picture.rectangle([0.0, top], [f64::from(width), legend_height], Color::rgb(0xffffff));
-    // In a narrow picture letters are smaller, so that no line ends outside of it.
+    // Text is smaller in a narrow picture, so that no line ends outside of it.
     let fitted = |text: &str, size: f64| size.min(1.5 * inner / text.chars().count().max(1) as f64);
     picture.text([MARGIN, 30.0], fitted(title, 21.0), Anchor::Start, INK, title);
     picture.text([MARGIN, 52.0], fitted(subtitle, 14.0), Anchor::Start, FAINT, subtitle);
@@ -191,7 +191,7 @@ fn depths(stage: &Stage, frame: &Frame) -> Vec<f64> {
     depths
 }
 
-/// The median size of the shapes that move, in pixels: the side of a square of their area.
+/// The median size of the moving shapes in pixels: the side of a square with the shape's area.
 fn typical(stage: &Stage, scale: f64) -> f64 {
     let moving = stage.shapes.iter().filter(|(body, _)| stage.kinds[*body as usize] != BodyKind::Static);
     let mut widths: Vec<f64> = moving.map(|(_, s)| s.mass(1.0).mass.sqrt()).collect();
@@ -200,8 +200,8 @@ fn typical(stage: &Stage, scale: f64) -> f64 {
     scale * widths.get(widths.len() / 2).copied().unwrap_or(1.0)
 }
 
-/// Contact points, normals and impulses; returns an impulse for the legend (N·s) and the pixels of
-/// its arrow.
+/// Draws contact points, normals and impulses. Returns an impulse for the legend (N·s) and the length of its
+/// arrow (pixels).
 fn points(picture: &mut Picture, stage: &Stage, frame: &Frame, view: &StageView, deepest: f64) -> (f64, f64) {
     let size = typical(stage, view.scale);
     let length = |p: &TouchPoint| p.impulse_vector()[0].hypot(p.impulse_vector()[1]);
@@ -240,7 +240,7 @@ fn points(picture: &mut Picture, stage: &Stage, frame: &Frame, view: &StageView,
     (shown, shown * pixels)
 }
 
-/// A shaft, and a head where there is room for one.
+/// Draws a shaft, and a head if there is room for one.
 fn arrow(picture: &mut Picture, from: [f64; 2], to: [f64; 2], width: f64) {
     let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
     let length = dx.hypot(dy);
@@ -257,10 +257,10 @@ fn arrow(picture: &mut Picture, from: [f64; 2], to: [f64; 2], width: f64) {
     picture.items.push(Item::Polygon { points, fill: Some(IMPULSE), stroke: None, title: String::new() });
 }
 
-/// Width of a color bar with room for a label in the middle (pixels).
+/// Minimum width of a color bar with room for a label in the middle (pixels).
 const THREE_LABELS: f64 = 140.0;
 
-/// `darkest`: the penetration of the darkest color, and the deepest there is (m).
+/// `darkest`: the penetration of the darkest color, and the deepest in the frame (m).
 fn legend(
     picture: &mut Picture,
     top: f64,
@@ -276,7 +276,7 @@ fn legend(
     let text = |picture: &mut Picture, x: f64, y: f64, anchor, text: String| {
         picture.text([x, y], size, anchor, INK, text);
     };
-    // A length.
+    // Length scale.
     let meters = round_down(0.6 * quarter / view.scale);
     let (x, bar) = (column(0), meters * view.scale);
     picture.line([x, bar_y], [x + bar, bar_y], INK, 2.0);
@@ -367,7 +367,7 @@ mod tests {
             .items
             .iter()
             .filter(|i| matches!(i, Item::Disc { title, .. } if title.contains("impulse")));
-        // Two for each of six points: a ring and its inside.
+        // Two discs for each of six points: a ring and its inside.
         assert_eq!(discs.count(), 12);
         let text = svg::svg(&picture);
         for part in ["stack:3", "below", "penetration", "N·s", "over the step", "contact and normal", " mm<"]

@@ -8,24 +8,24 @@ use crate::engine::world::World;
 use crate::lab::metrics::overlaps::Overlaps;
 use glam::{DVec2, Vec2};
 
-/// What does not change while a world runs.
+/// Data that does not change while a world runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stage {
-    /// Where frames have their origin (m): that of the first body, so that far from the world's
-    /// origin nothing is rounded away.
+    /// Origin of the frames (m): the position of the first body, so that far from the world's origin nothing
+    /// is lost to rounding.
     pub origin: [f64; 2],
     /// How each body moves.
     pub kinds: Vec<BodyKind>,
-    /// Body of each shape, and the shape in the frame of that body's center of mass.
+    /// Each shape with its body, in the frame of the body's center of mass.
     pub shapes: Vec<(u32, Shape)>,
-    /// Joints, as they are drawn.
+    /// Joints, in the form in which they are drawn.
     pub joints: Vec<JointRecord>,
     /// Step (s).
     pub dt: f64,
 }
 
 impl Stage {
-    /// Of a world whose bodies and joints have all been added.
+    /// From a world to which all bodies and joints have been added.
     pub fn of(world: &World) -> Self {
         let bodies = &world.bodies;
         let origin = if bodies.is_empty() { [0.0; 2] } else { bodies.center(0) };
@@ -35,16 +35,16 @@ impl Stage {
     }
 }
 
-/// A point where two shapes touch or nearly do.
+/// A point where two shapes touch or nearly touch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TouchPoint {
     /// Bodies a and b; impulses act on b.
     pub bodies: [u32; 2],
-    /// From the origin of the stage (m).
+    /// Position relative to the origin of the stage (m).
     pub at: [f64; 2],
     /// Unit normal from a to b.
     pub normal: [f32; 2],
-    /// Gap along it (m); negative is overlap.
+    /// Gap along the normal (m); negative is overlap.
     pub separation: f32,
     /// Normal and tangential impulse of the last step (N·s); the tangent is the normal turned by
     /// −90°.
@@ -59,18 +59,18 @@ impl TouchPoint {
     }
 }
 
-/// Where everything is after a step.
+/// State of all bodies and contacts after a step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frame {
-    /// Center of mass from the stage's origin (m), and angle in (−π, π] (rad), by body.
+    /// Center of mass relative to the stage's origin (m), and angle in (−π, π] (rad). `[bodies]`
     pub poses: Vec<[f64; 3]>,
-    /// Points of contact where the bodies are now; those with an impulse of the last step that
-    /// have parted since, too.
+    /// Contact points at the current positions, including those with an impulse in the last step that have
+    /// separated since.
     pub points: Vec<TouchPoint>,
 }
 
 impl Frame {
-    /// Of the world as it is. Impulses are there while `Settings::record_impulses` is on.
+    /// The current frame of a world. Impulses are zero unless `Settings::record_impulses` is on.
     pub fn of(world: &World, stage: &Stage, overlaps: Option<&mut Overlaps>) -> Self {
         let bodies = &world.bodies;
         let origin = DVec2::from(stage.origin);
@@ -89,7 +89,7 @@ impl Frame {
     }
 }
 
-/// Points by present geometry, with the impulses of the last step where the same features touched.
+/// Points at the current geometry, with the impulses of the last step if the same features touched in it.
 fn touch_points(world: &World, poses: &[[f64; 3]], overlaps: &mut Overlaps) -> Vec<TouchPoint> {
     let mut points = Vec::new();
     let mut contacts = world.contacts.iter().peekable();
@@ -110,7 +110,7 @@ fn touch_points(world: &World, poses: &[[f64; 3]], overlaps: &mut Overlaps) -> V
             }
         }
     };
-    // Pairs and contacts ascend alike.
+    // Pairs and contacts are sorted alike.
     overlaps.find(world, |[a, b], manifold| {
         while let Some(contact) = contacts.next_if(|c| c.key() < pair_key(a, b)) {
             part(&mut points, contact, &[]);
@@ -162,14 +162,14 @@ mod tests {
     fn a_stack_at_rest_carries_itself() {
         let (stage, frame) = frame("stack:3", 240);
         assert_eq!((stage.kinds.len(), frame.poses.len(), frame.points.len()), (4, 4, 6));
-        // 1 kg each under 10 m/s²: 30, 20 and 10 N, for 1/60 s, upward.
+        // 1 kg each at 10 m/s²: 30, 20 and 10 N, for 1/60 s, upward.
         for (below, load) in [(0, 30.0), (1, 20.0), (2, 10.0)] {
             let on = frame.points.iter().filter(|p| p.bodies[0] == below);
             let sum = on.map(|p| p.impulse_vector()).fold([0.0; 2], |s, v| [s[0] + v[0], s[1] + v[1]]);
             assert!((sum[1] * 60.0 / load - 1.0).abs() < 0.02 && sum[0].abs() < 1e-3, "{sum:?}");
         }
         assert!((0.0..0.02).contains(&frame.deepest()), "{}", frame.deepest());
-        // Points are where the boxes are.
+        // Points are at the boxes.
         assert!(frame.points.iter().all(|p| (p.at[0] - frame.poses[1][0]).abs() < 0.51));
     }
 

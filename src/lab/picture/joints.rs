@@ -1,17 +1,17 @@
-//! Joints as people draw them: a circle for a hinge, a line for a rod, a zigzag for a spring.
+//! Joints in the usual symbols: a circle for a hinge, a line for a rod, a zigzag for a spring.
 
 use super::outline::placed;
 use super::{Anchor, Color, Item, Picture};
 use crate::engine::joints::JointKind;
 use crate::engine::world::World;
 
-/// How a joint is drawn.
+/// Symbol of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum JointMark {
     /// A small circle.
     Revolute,
-    /// Its axis, and a box on it.
+    /// Its axis, with a box on it.
     Prismatic,
     /// A line.
     Distance,
@@ -19,38 +19,38 @@ pub enum JointMark {
     Spring,
     /// A square.
     Weld,
-    /// The axis of the suspension, and a circle.
+    /// The axis of the suspension, with a circle.
     Wheel,
-    /// A dashed line, and a diamond.
+    /// A dashed line with a diamond.
     Motor,
     /// A dashed line.
     Mouse,
 }
 
-/// A joint that does not change while a world runs.
+/// The data of a joint that does not change while a world runs.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct JointRecord {
-    /// How it is drawn.
+    /// Symbol of the joint.
     pub mark: JointMark,
-    /// a and b.
+    /// Bodies a and b.
     pub bodies: [u32; 2],
-    /// In the frames of the centers of mass of a and b (m).
+    /// Anchors in the frames of the centers of mass of a and b (m).
     pub anchors: [[f64; 2]; 2],
-    /// Direction in the frame of a (1); zeros where it has none.
+    /// Axis in the frame of a (1); zeros if the joint has none.
     pub axis: [f64; 2],
 }
 
 impl JointRecord {
-    /// Where its anchors are (m).
+    /// Positions of the anchors (m).
     pub fn ends(&self, poses: &[[f64; 3]]) -> [[f64; 2]; 2] {
         [0, 1].map(|k| placed(&[self.anchors[k]], poses[self.bodies[k] as usize])[0])
     }
 }
 
-/// Color of joints: purple, which neither contacts nor their depths have.
+/// Color of joints: purple, which is not used for contacts or their depths.
 const COLOR: Color = Color::rgb(0x7a3e9d);
 
-/// All joints of a world that hold something.
+/// All joints of a world that constrain anything.
 pub fn records(world: &World) -> Vec<JointRecord> {
     let of = |(_, joint): (_, &crate::engine::joints::Joint)| {
         let (mark, axis) = match &joint.kind {
@@ -78,8 +78,8 @@ pub fn records(world: &World) -> Vec<JointRecord> {
     world.joints().filter_map(of).collect()
 }
 
-/// Draws joints of bodies at `poses`, `size` pixels wide, where `at` takes places of the stage (m) to pixels. A hinge
-/// farther from the middle of a body than its `reach` (m) has a line to there.
+/// Draws the joints of bodies at `poses`, `size` pixels wide; `at` maps positions on the stage (m) to pixels.
+/// A hinge farther from a body's center than the body's `reach` (m) is connected to the center by a line.
 pub(super) fn draw(
     picture: &mut Picture,
     joints: &[JointRecord],
@@ -91,7 +91,7 @@ pub(super) fn draw(
     for joint in joints {
         let a = poses[joint.bodies[0] as usize];
         let [p, q] = joint.ends(poses).map(&at);
-        // Along the axis as far as b's anchor, and a bit on.
+        // Along the axis to b's anchor, and slightly beyond.
         let (sin, cos) = a[2].sin_cos();
         let axis = [cos * joint.axis[0] - sin * joint.axis[1], -(sin * joint.axis[0] + cos * joint.axis[1])];
         let way = axis[0] * (q[0] - p[0]) + axis[1] * (q[1] - p[1]);
@@ -118,7 +118,8 @@ fn width(size: f64) -> f64 {
     (0.18 * size).clamp(0.7, 1.8)
 }
 
-/// One mark from anchor to anchor, `size` pixels wide; `ends` are those of its axis, `angle` is that of body a.
+/// One symbol from anchor to anchor, `size` pixels wide. `ends` are the ends of its axis, `angle` is that of
+/// body a.
 fn one(
     picture: &mut Picture,
     mark: JointMark,
@@ -171,7 +172,7 @@ fn one(
     }
 }
 
-/// The marks of these joints with their names, in a row at this height (pixels).
+/// The symbols of these joints with their names, in a row at this height (pixels).
 pub(super) fn legend(picture: &mut Picture, joints: &[JointRecord], [mut x, y]: [f64; 2], ink: Color) {
     const NAMES: [(JointMark, &str); 8] = [
         (JointMark::Revolute, "hinge"),
@@ -192,7 +193,7 @@ pub(super) fn legend(picture: &mut Picture, joints: &[JointRecord], [mut x, y]: 
     }
 }
 
-/// Points of a spring between two places, `half` pixels to both sides.
+/// Points of a spring between two positions, with an amplitude of `half` pixels.
 fn zigzag(p: [f64; 2], q: [f64; 2], half: f64) -> Vec<[f64; 2]> {
     let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
     let length = dx.hypot(dy).max(1e-9);

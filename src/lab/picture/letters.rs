@@ -1,13 +1,13 @@
-//! Letters of strokes for bitmaps, so that a picture has the same text on every machine: what a
-//! system has installed is not asked.
+//! Letters made of strokes, for bitmaps. Installed fonts are not used, so a picture has the same text on
+//! every machine.
 //!
-//! A letter stands on a grid, four units wide and six high. A point is two characters, x and y;
-//! `a` and `b` are one and two below the baseline. Points of one stroke follow each other, strokes
-//! are separated by spaces; a stroke that goes nowhere is a dot.
+//! A letter is defined on a grid, four units wide and six high. A point is two characters, x and y; `a` and
+//! `b` are one and two units below the baseline. The points of a stroke follow each other, and strokes are
+//! separated by spaces. A stroke of zero length is a dot.
 
-/// Width of a digit with the space behind it, in units.
+/// Width of a digit including the space after it, in units.
 const ADVANCE: f64 = 5.6;
-/// Space behind a letter.
+/// Space after a letter.
 const GAP: f64 = 1.7;
 /// Height of a capital, in units.
 pub const HEIGHT: f64 = 6.0;
@@ -113,7 +113,7 @@ const LETTERS: &[(char, &str)] = &[
     (' ', ""),
 ];
 
-/// What stands for a letter that there is not.
+/// Shown for an unknown letter.
 const MISSING: &str = "0006464000";
 
 /// The strokes of a letter, in units: y upward from the baseline.
@@ -128,8 +128,8 @@ pub fn strokes(letter: char) -> Vec<Vec<[f64; 2]>> {
     code.split(' ').filter(|s| !s.is_empty()).map(stroke).collect()
 }
 
-/// Where the strokes of a letter begin, and how far on the next letter is; digits are all as wide, so
-/// that numbers stand in columns.
+/// Left edge of the strokes of a letter, and the advance to the next letter. All digits have the same
+/// advance, so that numbers align in columns.
 pub fn extent(letter: char) -> [f64; 2] {
     let points = strokes(letter).concat();
     let least = points.iter().map(|p| p[0]).fold(f64::INFINITY, f64::min);

@@ -18,7 +18,7 @@ pub mod png;
 pub mod raster;
 pub mod svg;
 
-/// Red, green, blue and opacity, of 255.
+/// Red, green, blue and opacity, 0 to 255.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Color(pub u8, pub u8, pub u8, pub u8);
 
@@ -28,7 +28,7 @@ impl Color {
         Color((value >> 16) as u8, (value >> 8) as u8, value as u8, 255)
     }
 
-    /// The color at `share` of the way to another, in [0, 1].
+    /// The color at the fraction `share`, in [0, 1], of the way to another.
     pub fn toward(self, other: Color, share: f64) -> Self {
         let share = share.clamp(0.0, 1.0);
         let mix = |a: u8, b: u8| (f64::from(a) + share * (f64::from(b) - f64::from(a))).round() as u8;
@@ -36,7 +36,7 @@ impl Color {
     }
 }
 
-/// Where a text is anchored at its point.
+/// How a text is aligned at its point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Anchor {
     /// At its left end.
@@ -47,25 +47,25 @@ pub enum Anchor {
     End,
 }
 
-/// Something drawn; lengths in pixels, y downward.
+/// A drawn item; lengths in pixels, y downward.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Item {
     /// A closed outline.
     Polygon {
         /// Its vertices.
         points: Vec<[f64; 2]>,
-        /// Inside.
+        /// Fill color, if any.
         fill: Option<Color>,
-        /// Border and its width.
+        /// Color and width of the border, if any.
         stroke: Option<(Color, f64)>,
-        /// Shown while the pointer is over it; empty for none.
+        /// Shown while the pointer is over it; empty for no text.
         title: String,
     },
     /// A stroke with round ends.
     Line {
-        /// From.
+        /// Start.
         from: [f64; 2],
-        /// To.
+        /// End.
         to: [f64; 2],
         /// Its color.
         color: Color,
@@ -80,16 +80,16 @@ pub enum Item {
         radius: f64,
         /// Its color.
         color: Color,
-        /// Shown while the pointer is over it; empty for none.
+        /// Shown while the pointer is over it; empty for no text.
         title: String,
     },
     /// One line of text on its baseline.
     Text {
-        /// The anchor.
+        /// Position of the anchor.
         at: [f64; 2],
-        /// Height of the letters' body.
+        /// Font size.
         size: f64,
-        /// Which end is at the anchor.
+        /// Alignment at the anchor.
         anchor: Anchor,
         /// Its color.
         color: Color,
@@ -98,12 +98,12 @@ pub enum Item {
     },
 }
 
-/// What is drawn, from back to front.
+/// A list of drawn items, from back to front.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Width and height (pixels).
     pub size: [u32; 2],
-    /// Drawn first.
+    /// Background color.
     pub background: Color,
     /// In the order in which they are drawn.
     pub items: Vec<Item>,
@@ -115,17 +115,17 @@ impl Picture {
         Picture { size, background, items: Vec::new() }
     }
 
-    /// A stroke.
+    /// Adds a stroke.
     pub fn line(&mut self, from: [f64; 2], to: [f64; 2], color: Color, width: f64) {
         self.items.push(Item::Line { from, to, color, width });
     }
 
-    /// A text.
+    /// Adds a text.
     pub fn text(&mut self, at: [f64; 2], size: f64, anchor: Anchor, color: Color, text: impl Into<String>) {
         self.items.push(Item::Text { at, size, anchor, color, text: text.into() });
     }
 
-    /// A filled rectangle.
+    /// Adds a filled rectangle.
     pub fn rectangle(&mut self, [x, y]: [f64; 2], [width, height]: [f64; 2], fill: Color) {
         let points = vec![[x, y], [x + width, y], [x + width, y + height], [x, y + height]];
         self.items.push(Item::Polygon { points, fill: Some(fill), stroke: None, title: String::new() });

@@ -3,11 +3,11 @@
 use crate::engine::shapes::Shape;
 use std::f64::consts::TAU;
 
-/// Corners of a full turn: their chords are within 0.2 % of the arc.
+/// Corners per full turn; their chords are within 0.2 % of the arc.
 const ROUND: usize = 48;
 
-/// The border of a shape in its body's frame (m), counter-clockwise: two points of a segment,
-/// arcs as chords.
+/// The border of a shape in its body's frame (m), counter-clockwise. A segment has two points; arcs become
+/// chords.
 pub fn outline(shape: &Shape) -> Vec<[f64; 2]> {
     let mut core: Vec<[f64; 2]> = Vec::new();
     shape.for_each_vertex(|v| core.push([f64::from(v.x), f64::from(v.y)]));
@@ -15,7 +15,7 @@ pub fn outline(shape: &Shape) -> Vec<[f64; 2]> {
     if radius == 0.0 {
         return core;
     }
-    // At every vertex an arc from the normal of the edge before it to that of the edge after it.
+    // At every vertex, an arc from the normal of the previous edge to that of the next one.
     let count = core.len();
     let direction = |i: usize| {
         let ([px, py], [qx, qy]) = (core[i % count], core[(i + 1) % count]);
@@ -40,7 +40,7 @@ pub fn outline(shape: &Shape) -> Vec<[f64; 2]> {
     points
 }
 
-/// Points of a body's frame where its pose (m, rad) puts them.
+/// Points of a body's frame, transformed by its pose (m, rad).
 pub fn placed(points: &[[f64; 2]], [x, y, angle]: [f64; 3]) -> Vec<[f64; 2]> {
     let (sin, cos) = angle.sin_cos();
     points.iter().map(|[u, v]| [x + cos * u - sin * v, y + sin * u + cos * v]).collect()

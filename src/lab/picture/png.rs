@@ -1,4 +1,4 @@
-//! A PNG file: signature and four chunks around what `miniz_oxide` compresses.
+//! A PNG file: signature and four chunks around data compressed by `miniz_oxide`.
 
 /// CRC-32 of the PNG specification: the reflected polynomial 0xedb88320.
 fn crc(bytes: impl IntoIterator<Item = u8>) -> u32 {
@@ -26,7 +26,8 @@ pub fn png([width, height]: [u32; 2], pixels: &[[u8; 3]]) -> Vec<u8> {
     header.extend(height.to_be_bytes());
     // 8 bits, RGB, deflate, filters by row, not interlaced.
     header.extend([8, 2, 0, 0, 0]);
-    // Each row as differences to the one above (filter 2): most of a picture repeats downward.
+    // Each row is stored as differences to the one above (filter 2), because most of a picture repeats
+    // downward.
     let mut rows = Vec::with_capacity(pixels.len() * 3 + height as usize);
     let width = width as usize;
     for (y, row) in pixels.chunks(width.max(1)).enumerate() {

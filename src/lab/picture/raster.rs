@@ -1,11 +1,11 @@
-//! Pictures as pixels, with smooth edges: coverage by `ab_glyph_rasterizer`.
+//! Pictures as pixels, with smooth edges from the coverage of `ab_glyph_rasterizer`.
 
 use super::letters::{self, HEIGHT};
 use super::{Anchor, Color, Item, Picture};
 use ab_glyph_rasterizer::{Rasterizer, point};
 use std::f64::consts::TAU;
 
-/// Height of capitals over the size of a font.
+/// Height of capitals ÷ font size.
 const CAPITAL: f64 = 0.70;
 
 /// The pixels of a picture, row by row.
@@ -49,7 +49,7 @@ impl Canvas {
                         let points: Vec<_> =
                             stroke.iter().map(|[u, v]| [left + unit * (u - begin), y - unit * v]).collect();
                         match points[..] {
-                            // A dot is as wide as two strokes side by side.
+                            // A dot is slightly narrower than two strokes.
                             [first, last] if first == last => self.fill(&disc(first, 0.08 * size), *color),
                             _ => self.stroke(&points, false, *color, 0.095 * size),
                         }
@@ -60,8 +60,8 @@ impl Canvas {
         }
     }
 
-    /// Segments with round ends; all of one color, drawn as one coverage so that joints do not
-    /// show where it is transparent.
+    /// Segments with round ends. All have one color and are drawn as one coverage, so that joints are not
+    /// visible in a transparent color.
     fn stroke(&mut self, points: &[[f64; 2]], closed: bool, color: Color, width: f64) {
         let half = 0.5 * width;
         let mut parts: Vec<Vec<[f64; 2]>> = points.iter().map(|&at| disc(at, half)).collect();
@@ -86,7 +86,7 @@ impl Canvas {
         self.cover(std::slice::from_ref(&polygon.to_vec()), color);
     }
 
-    /// Mixes `color` in where any of the polygons covers a pixel.
+    /// Blends `color` where any of the polygons covers a pixel.
     fn cover(&mut self, polygons: &[Vec<[f64; 2]>], color: Color) {
         let [width, height] = self.size.map(f64::from);
         let clipped: Vec<Vec<[f64; 2]>> =
@@ -121,7 +121,7 @@ impl Canvas {
     }
 }
 
-/// Whole pixels that hold a polygon of the canvas: lower corner, and upper corner beyond them.
+/// Bounding box of a polygon on the canvas, in whole pixels: lower corner, and upper corner (exclusive).
 fn bounds(polygon: &[[f64; 2]]) -> [[usize; 2]; 2] {
     let least = |k: usize| polygon.iter().map(|p| p[k]).fold(f64::INFINITY, f64::min).floor() as usize;
     let most = |k: usize| polygon.iter().map(|p| p[k]).fold(0.0, f64::max).ceil() as usize;
@@ -140,7 +140,7 @@ fn disc([x, y]: [f64; 2], radius: f64) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// The part of a polygon within the canvas: cut at one side after the other.
+/// The part of a polygon within the canvas, clipped at one side after the other.
 fn clip(polygon: &[[f64; 2]], width: f64, height: f64) -> Vec<[f64; 2]> {
     let mut points = polygon.to_vec();
     for (axis, limit, sign) in [(0, 0.0, 1.0), (0, width, -1.0), (1, 0.0, 1.0), (1, height, -1.0)] {

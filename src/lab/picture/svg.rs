@@ -1,9 +1,9 @@
-//! Pictures as SVG, and the pieces of SVG text that plots are written from.
+//! Pictures as SVG, and helpers for writing plots as SVG text.
 
 use super::{Anchor, Color, Item, Picture};
 use std::fmt::Write;
 
-/// Text as it may stand between tags and in attributes.
+/// Text escaped for SVG elements and attributes.
 pub fn escaped(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
@@ -12,7 +12,7 @@ pub fn escaped(text: &str) -> String {
             '<' => safe += "&lt;",
             '>' => safe += "&gt;",
             '"' => safe += "&quot;",
-            // XML has no control characters, not even escaped.
+            // XML allows no control characters, not even escaped.
             c if c.is_control() => safe.push('\u{fffd}'),
             c => safe.push(c),
         }
@@ -20,7 +20,7 @@ pub fn escaped(text: &str) -> String {
     safe
 }
 
-/// A length in pixels, to a hundredth, without zeros behind the point.
+/// A length in pixels, to a hundredth, without trailing zeros.
 pub fn px(value: f64) -> String {
     let text = format!("{value:.2}");
     let short = text.trim_end_matches('0').trim_end_matches('.');
@@ -40,7 +40,7 @@ fn opacity(name: &str, Color(.., a): Color) -> String {
     if a == 255 { String::new() } else { format!(" {name}=\"{}\"", px(f64::from(a) / 255.0)) }
 }
 
-/// The element `tag` with its closing part: with a title inside if there is one.
+/// Closes the element `tag`, with a title inside if there is one.
 fn close(tag: &str, title: &str) -> String {
     match title {
         "" => "/>\n".into(),

@@ -1,8 +1,8 @@
 //! Limits of the machine: bytes per second from each level of cache, operations per second.
 //!
-//! Three loops that do nothing else, on one thread: *read* adds up a buffer, *update* reads it and
-//! writes it back, *multiply-add* keeps twelve independent chains in registers. The first two use the
-//! widest lanes there are, since they ask what memory can do; the third the width of the run.
+//! Three loops measure one resource each, on one thread: *read* sums a buffer, *update* reads it and writes
+//! it back, *multiply-add* keeps twelve independent chains in registers. The first two use the widest
+//! available lanes, since they measure memory; the third uses the lane width of the run.
 
 use crate::engine::lanes::{Block, LaneWidth, Lanes};
 use crate::lab::study::sample::median;
@@ -15,18 +15,18 @@ use wide::{f32x4, f32x8, f32x16};
 pub struct MemoryLevel {
     /// `L1`, `L2`, `L3`, `DRAM`
     pub name: String,
-    /// Bytes of the buffer that is used to measure it.
+    /// Size of the buffer that measures it (bytes).
     pub bytes: usize,
 }
 
-/// Largest buffer (bytes): enough to leave any cache of a desktop, and no burden on memory.
+/// Largest buffer (bytes): larger than any cache of a desktop, but small compared with its memory.
 const LARGEST: usize = 256 << 20;
 
-/// Cache sizes where the system does not tell (bytes).
+/// Default cache sizes if the system does not report them (bytes).
 const USUAL: [(&str, usize); 3] = [("L1", 32 << 10), ("L2", 1 << 20), ("L3", 16 << 20)];
 
-/// The caches of the first processor and the memory behind them, each with a working set that it
-/// holds: half a cache, and four times the last one for memory.
+/// The caches of the first processor and the memory behind them, each with a working set that fits: half of a
+/// cache, and four times the largest cache for memory.
 pub fn levels() -> Vec<MemoryLevel> {
     let mut caches = system_caches();
     if caches.is_empty() {
@@ -41,7 +41,7 @@ pub fn levels() -> Vec<MemoryLevel> {
     levels
 }
 
-/// Data and unified caches, as Linux lists them; none elsewhere.
+/// Data and unified caches as reported by Linux; empty on other systems.
 fn system_caches() -> Vec<(String, usize)> {
     let mut caches = Vec::new();
     for index in 0..8 {
@@ -62,7 +62,7 @@ fn system_caches() -> Vec<(String, usize)> {
     caches
 }
 
-/// `48K`, `16M` in bytes.
+/// Parses `48K` or `16M` (bytes).
 fn parse_size(text: &str) -> Option<usize> {
     let split = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
     let (number, unit) = text.split_at(split);
@@ -82,10 +82,10 @@ pub struct Buffer {
 }
 
 impl Buffer {
-    /// A buffer that is at least as large as every level and `bytes`, up to a quarter gigabyte.
+    /// A buffer at least as large as every level and `bytes`, but at most a quarter gigabyte.
     pub fn new(levels: &[MemoryLevel], bytes: usize) -> Self {
         let most = levels.iter().map(|l| l.bytes).max().unwrap_or(0).max(bytes);
-        // Every page is touched, and no number is subnormal.
+        // This touches every page, and no number is subnormal.
         Buffer { blocks: vec![Block([1.0; 16]); blocks_of(most.min(LARGEST))] }
     }
 
@@ -97,8 +97,8 @@ impl Buffer {
     /// Bytes read per nanosecond (GB/s) from a working set of `bytes`, in about `time`.
     pub fn read(&mut self, bytes: usize, time: Duration) -> f64 {
         let part = &*self.part(bytes);
-        // Which of the two is faster depends on the level: few streams suit the prefetcher, and
-        // close to the core it is the additions' latency that limits.
+        // Which of the two is faster depends on the level: few streams suit the prefetcher, while close to
+        // the core the latency of additions is the limit.
         let few = repeated(time / 2, || {
             black_box(read::<2>(black_box(part)));
         });
@@ -117,15 +117,15 @@ impl Buffer {
     }
 }
 
-/// Read bandwidth by size of the working set.
+/// Read bandwidth as a function of the size of the working set.
 pub struct ReadCurve {
     buffer: Buffer,
-    /// Sizes (bytes), each twice the last, and what was measured (GB/s).
+    /// Sizes (bytes), each twice the previous one, with the measured rates (GB/s).
     sizes: Vec<(usize, Vec<f64>)>,
 }
 
 impl ReadCurve {
-    /// For sizes from 16 KiB up to `largest`, or a quarter gigabyte.
+    /// For sizes from 16 KiB up to `largest`, at most a quarter gigabyte.
     pub fn new(largest: usize) -> Self {
         let buffer = Buffer::new(&[], largest.max(16 << 10));
         let most = size_of_val(buffer.blocks.as_slice());
@@ -143,7 +143,7 @@ impl ReadCurve {
         }
     }
 
-    /// Rate at which a set of `bytes` is read (GB/s): medians, interpolated on the logarithm of the
+    /// Rate at which a working set of `bytes` is read (GB/s): medians, interpolated on the logarithm of the
     /// size, and never faster than a smaller set.
     pub fn at(&self, bytes: usize) -> f64 {
         let mut least = f64::INFINITY;
@@ -179,9 +179,10 @@ pub fn multiply_adds(width: LaneWidth, time: Duration) -> f64 {
     }
 }
 
-/// Chains: latency 4 times 2 units needs 8, and as many again fit the registers of no width.
+/// Independent chains: latency 4 × 2 units needs 8; twice as many would not fit in the registers at any
+/// width.
 const CHAINS: usize = 12;
-/// Links of each chain in one call.
+/// Operations of each chain per call.
 const LINKS: usize = 256;
 
 fn multiply_adds_of<L: Lanes>(time: Duration) -> f64 {
@@ -191,7 +192,7 @@ fn multiply_adds_of<L: Lanes>(time: Duration) -> f64 {
     (2 * L::WIDTH * CHAINS * LINKS) as f64 / ns
 }
 
-/// x ← x/2 + 1/2: tends to one, neither overflows nor becomes subnormal.
+/// x ← x/2 + 1/2 tends to one; it neither overflows nor becomes subnormal.
 #[inline(never)]
 fn chains<L: Lanes>(half: L) -> [L; CHAINS] {
     let mut x = [L::splat(1.5); CHAINS];
@@ -216,7 +217,7 @@ fn read<const SUMS: usize>(blocks: &[Block]) -> f32x16 {
     rest.iter().chain(&sums).fold(f32x16::splat(0.0), |sum, vector| sum + *vector)
 }
 
-/// Changes signs: needs no arithmetic unit that a sweep would miss.
+/// Changes signs, which needs no floating-point arithmetic.
 #[inline(never)]
 fn update(blocks: &mut [Block]) {
     let vectors: &mut [f32x16] = bytemuck::cast_slice_mut(blocks);
@@ -225,7 +226,8 @@ fn update(blocks: &mut [Block]) {
     }
 }
 
-/// Nanoseconds of one call, of as many as fit into `time`; at least two, the first not counted.
+/// Time of one call (ns): the mean of as many calls as fit into `time`, after two calls to estimate that
+/// number.
 fn repeated(time: Duration, mut call: impl FnMut()) -> f64 {
     let mut once = |times: u32| {
         let start = Instant::now();
@@ -276,7 +278,7 @@ mod tests {
         assert_eq!(read::<8>(&buffer.blocks).to_array(), [13.0; 16]);
         update(buffer.part(64 * 2));
         assert_eq!(read::<2>(&buffer.blocks).to_array(), [9.0; 16]);
-        // Larger than there is: all of it.
+        // More than the buffer holds: all of it.
         assert_eq!(buffer.part(usize::MAX / 2).len(), 13);
         assert!(chains(0.5_f32).iter().all(|&x| x == 1.0));
         let rates = [

@@ -1,9 +1,9 @@
-//! The cost of a contact as scenes grow: what stays flat, what steps where a cache ends, and what
-//! grows.
+//! The cost of a contact as scenes grow: which phases stay flat, which have a step at the end of a cache, and
+//! which grow.
 //!
-//! Scenes of all sizes are frozen and timed interleaved, so a slow spell of the machine affects all of them alike. A
-//! turn is a few whole steps on the same state, pairs searched again in each; the first finds cold caches and is not
-//! timed.
+//! Scenes of all sizes are frozen and timed interleaved, so a slow spell of the machine affects all of them
+//! alike. A turn is a few whole steps on the same state, each with a new search for pairs. The first step of
+//! a turn finds cold caches and is not timed.
 
 use super::ceilings::ReadCurve;
 use super::waiting::{self, waited};
@@ -13,26 +13,26 @@ use crate::lab::metrics::Errors;
 use crate::lab::study::sample::median;
 use std::time::{Duration, Instant};
 
-/// A world that takes part.
+/// A world of one size.
 pub struct GrowthWorld {
-    /// Name with its size.
+    /// Name of the scene with its size.
     pub scene: String,
-    /// Settled.
+    /// The settled world.
     pub world: World,
     /// Errors of its last settling steps.
     pub errors: Option<Errors>,
 }
 
-/// Of repeated steps (ns).
+/// Times of repeated steps (ns).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepTime {
     /// Median.
     pub ns: f64,
     /// Mean.
     pub mean_ns: f64,
-    /// The longest.
+    /// Longest.
     pub longest_ns: f64,
-    /// Median distance from the median.
+    /// Median deviation from the median.
     pub spread_ns: f64,
 }
 
@@ -46,22 +46,22 @@ impl StepTime {
     }
 }
 
-/// One size.
+/// Measurements of one size.
 #[derive(Clone, Debug)]
 pub struct SizeRow {
-    /// Name with its size.
+    /// Name of the scene with its size.
     pub scene: String,
-    /// Bodies.
+    /// Number of bodies.
     pub bodies: usize,
-    /// Counts of the step that is repeated.
+    /// Counts of the repeated step.
     pub counts: StepCounts,
-    /// The whole step.
+    /// Time of the whole step.
     pub step: StepTime,
-    /// Each phase, in the order of [`Phase::ALL`].
+    /// Time of each phase, in the order of [`Phase::ALL`].
     pub phases: [StepTime; Phase::ALL.len()],
     /// Memory of the world.
     pub memory: Memory,
-    /// Errors beside the times.
+    /// Errors of the last settling steps.
     pub errors: Option<Errors>,
 }
 
@@ -76,35 +76,35 @@ impl SizeRow {
     }
 }
 
-/// Time of one world in one round, beyond its first step.
+/// Time of one world in one round, without its first step.
 const TURN: Duration = Duration::from_millis(40);
-/// Time of one size of memory in one round.
+/// Time to measure one working-set size in one round.
 const READ: Duration = Duration::from_millis(1);
-/// Pauses are taken out of steps longer than this (ns), in which reading them costs little; shorter
-/// ones mostly have none, and those that have are left out.
+/// In steps longer than this (ns), pauses are measured and subtracted, at negligible cost. Shorter steps
+/// mostly have no pause; those that have one are dropped.
 const LONG_NS: u64 = 4_000_000;
-/// A step that waited for a processor for more than this share of its time is left out, where enough
-/// others are left.
+/// A step that waited for a processor for more than this fraction of its time is dropped, if enough others
+/// remain.
 const PAUSE: f64 = 0.01;
-/// Steps that are kept at least.
+/// Minimum number of steps that are kept.
 const FEWEST: usize = 3;
-/// Steps of a turn, at most: the caches are warm long before.
+/// Maximum number of steps in a turn: the caches are warm long before.
 const STEPS: usize = 400;
 
-/// Measured values.
+/// Result of the measurement.
 pub struct Measurement {
-    /// In the order of the entries.
+    /// One row per world, in the given order.
     pub rows: Vec<SizeRow>,
-    /// How fast memory was read, in the same rounds.
+    /// Read bandwidth of memory, measured in the same rounds.
     pub memory: ReadCurve,
-    /// Share of the time in which the thread waited for a processor, where that is known.
+    /// Fraction of the time in which the thread waited for a processor, if known.
     pub waiting: Option<f64>,
 }
 
-/// A step, and the share of its time in which the thread waited.
+/// A step, and the fraction of its time in which the thread waited.
 type StepSample = (Timings, f64);
 
-/// Times all worlds in turn, `repeats` rounds, and in each how fast memory is read.
+/// Times all worlds in turn for `repeats` rounds, and measures read bandwidth in each round.
 pub fn measure(entries: &mut [GrowthWorld], repeats: u32, progress: &dyn Fn(u32)) -> Measurement {
     let largest = entries.iter().map(|e| e.world.memory().used()).max().unwrap_or(0);
     let mut memory = ReadCurve::new(largest);
@@ -123,7 +123,7 @@ pub fn measure(entries: &mut [GrowthWorld], repeats: u32, progress: &dyn Fn(u32)
 }
 
 fn row(entry: &GrowthWorld, mut samples: Vec<StepSample>) -> SizeRow {
-    // Steps without a pause, or those with the shortest ones.
+    // Keep the steps without a pause, or at least those with the shortest ones.
     samples.sort_by(|a, b| a.1.total_cmp(&b.1));
     let whole = samples.iter().take_while(|s| s.1 <= PAUSE).count();
     samples.truncate(whole.max(FEWEST));
@@ -141,7 +141,7 @@ fn row(entry: &GrowthWorld, mut samples: Vec<StepSample>) -> SizeRow {
     }
 }
 
-/// One turn: a step that finds cold caches and is not timed, then as many as fit.
+/// One turn: a step on cold caches that is not timed, then as many steps as fit.
 fn turn(world: &mut World, samples: &mut Vec<StepSample>) {
     let mut frozen = world.hold();
     let net = frozen.step(false).step_ns > LONG_NS;
@@ -156,53 +156,53 @@ fn turn(world: &mut World, samples: &mut Vec<StepSample>) {
     }
 }
 
-/// The size at which a scene has `target` contacts, if contacts grow as a power of the size, from
-/// two sizes and their contacts. None if they do not grow.
+/// The size at which a scene has `target` contacts, from two sizes and their numbers of contacts, if contacts
+/// grow as a power of the size. `None` if they do not grow.
 pub fn size_for(target: f64, [small, large]: [(f64, f64); 2]) -> Option<f64> {
     let power = (large.1 / small.1).ln() / (large.0 / small.0).ln();
     let size = large.0 * (target / large.1).powf(1.0 / power);
     (power > 0.1 && size.is_finite()).then_some(size)
 }
 
-/// How the cost per contact went from one size to the next.
+/// How the cost per contact changed from one size to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Change {
     /// It stayed or fell.
     Flat,
-    /// It rose by no more than memory of the phase's working set became slower.
+    /// It rose by no more than reading the phase's working set from memory became slower.
     Cache,
-    /// It rose by no more than that and the logarithm.
+    /// It rose by no more than that times the logarithm.
     Logarithm,
-    /// It rose by more than n log n and memory account for.
+    /// It rose by more than n log n and memory explain.
     Faster,
 }
 
-/// One step from size to size.
+/// The change from one size to the next.
 #[derive(Clone, Copy, Debug)]
 pub struct Growth {
-    /// Contacts before and after.
+    /// Number of contacts before and after.
     pub contacts: [usize; 2],
-    /// Cost per contact, after over before.
+    /// Cost per contact, after ÷ before.
     pub ratio: f64,
-    /// How much slower memory is read, before over after.
+    /// Read bandwidth of memory, before ÷ after.
     pub memory: f64,
-    /// What that was.
+    /// Kind of the change.
     pub change: Change,
 }
 
-/// Tolerance of a ratio for reasons other than growth: measured ratios of equal worlds differ by a tenth on a machine
-/// with other guests.
+/// Tolerance of a ratio for reasons other than growth: on a machine with other guests, ratios of equal worlds
+/// differ by a tenth.
 const TOLERANCE: f64 = 1.15;
 
-/// Judges a ratio of costs per contact by the contacts on both sides, the spread of the times
-/// (relative) and how much slower memory has become.
+/// Classifies a ratio of costs per contact, given the numbers of contacts, the relative spread of the times
+/// and the slowdown of memory.
 ///
-/// For an n log n method the cost per contact grows by ln n₂/ln n₁; streams cost what their bytes cost. Faster growth
-/// is what the product of both, with the tolerance and twice the spread, does not reach.
+/// The cost per contact of an n log n method grows by ln n₂/ln n₁, and that of streaming by the slowdown of
+/// memory. Growth is faster if it exceeds the product of both with the tolerance and twice the spread.
 pub fn judge(contacts: [usize; 2], ratio: f64, spread: f64, memory: f64) -> Growth {
     let [before, after] = contacts.map(|n| (n.max(2) as f64).ln());
     let room = TOLERANCE + 2.0 * spread;
-    // Not a number, where nothing was measured, excuses nothing.
+    // NaN, if nothing was measured, counts as no slowdown.
     let (memory, logarithm) = (memory.max(1.0), (after / before).max(1.0));
     let change = match ratio {
         r if r <= room => Change::Flat,
@@ -216,19 +216,19 @@ pub fn judge(contacts: [usize; 2], ratio: f64, spread: f64, memory: f64) -> Grow
 /// Growth of one phase over all sizes.
 #[derive(Clone, Debug)]
 pub struct GrowthVerdict {
-    /// None for the whole step.
+    /// The phase; `None` for the whole step.
     pub phase: Option<Phase>,
     /// p in time ~ contactsᵖ, least squares on logarithms.
     pub exponent: f64,
-    /// Least and largest cost per contact (ns).
+    /// Smallest and largest cost per contact (ns).
     pub range: [f64; 2],
-    /// From each size to the next.
+    /// Changes from each size to the next.
     pub steps: Vec<Growth>,
-    /// From the smallest size to the largest: many small rises are none of them a step.
+    /// Change from the smallest size to the largest, which reveals many small rises.
     pub whole: Growth,
 }
 
-/// Below this a phase's cost is not judged (ns per contact).
+/// Phases that cost less than this are not judged (ns per contact).
 const NEGLIGIBLE: f64 = 0.5;
 
 /// Judges every phase and the whole step; rows are in ascending order of contacts.
@@ -262,7 +262,7 @@ pub fn verdicts(rows: &[SizeRow], memory: &ReadCurve) -> Vec<GrowthVerdict> {
     verdicts
 }
 
-/// Bytes that a phase goes through, by the arrays that it names.
+/// Bytes that a phase accesses, from the sizes of its arrays.
 fn working_set(memory: &Memory, phase: Option<Phase>) -> usize {
     let names: &[&str] = match phase {
         None => return memory.used(),
@@ -291,7 +291,7 @@ mod tests {
 
     #[test]
     fn sizes_follow_the_power_of_their_contacts() {
-        // 1.5 N²: a pyramid; N: a column.
+        // 1.5 N² for a pyramid, N for a column.
         let size = size_for(15_000.0, [(10.0, 150.0), (20.0, 600.0)]).unwrap();
         assert!((size - 100.0).abs() < 1e-9, "{size}");
         assert!((size_for(500.0, [(10.0, 10.0), (20.0, 20.0)]).unwrap() - 500.0).abs() < 1e-9);
@@ -310,7 +310,7 @@ mod tests {
         assert_eq!(judge(2.4, 3.0), Change::Cache);
         assert_eq!(judge(6.0, 3.0), Change::Logarithm);
         assert_eq!(judge(7.0, 3.0), Change::Faster);
-        // Memory that happens to be read faster excuses nothing less.
+        // Memory that happens to be read faster does not tighten the bound.
         assert_eq!(judge(2.2, 0.5), Change::Logarithm);
         assert_eq!(super::judge([1000, 1_000_000], 1.3, 0.1, 1.0).change, Change::Flat);
     }

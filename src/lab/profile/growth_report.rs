@@ -1,4 +1,4 @@
-//! Growth as tables, words, a file and a picture.
+//! Growth as tables, sentences, CSV and a plot.
 
 use super::growth::{Change, GrowthVerdict, SizeRow};
 use crate::engine::clock::Phase;
@@ -10,13 +10,13 @@ use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
-/// Phases that any of the rows spent time in.
+/// Phases with a non-zero time in any of the rows.
 fn phases(rows: &[SizeRow]) -> Vec<Phase> {
     let has = |p: &Phase| rows.iter().any(|r| r.phases[*p as usize].ns > 0.0);
     Phase::ALL.into_iter().filter(has).collect()
 }
 
-/// Times and memory per contact, and what that means.
+/// Times and memory per contact, with a verdict on each phase.
 pub fn text(rows: &[SizeRow], verdicts: &[GrowthVerdict]) -> String {
     let phases = phases(rows);
     let mut header = vec!["scene", "bodies", "contacts", "step", "mean", "longest", "±"];
@@ -63,7 +63,7 @@ pub fn text(rows: &[SizeRow], verdicts: &[GrowthVerdict]) -> String {
     text
 }
 
-/// One phase in words.
+/// The verdict on one phase, as a sentence.
 pub(super) fn sentence(verdict: &GrowthVerdict) -> String {
     let name = verdict.phase.map_or("whole step", Phase::name);
     let range = verdict.range.map(digits);
@@ -117,7 +117,7 @@ pub(super) fn sentence(verdict: &GrowthVerdict) -> String {
     text
 }
 
-/// Everything, a row per size.
+/// All measurements as CSV, a row per size.
 pub fn csv(rows: &[SizeRow]) -> Result<Vec<u8>, Error> {
     let failed = |e: csv::Error| Error::invalid("growth.csv", e.to_string());
     let mut writer = csv::Writer::from_writer(Vec::new());
@@ -174,7 +174,7 @@ const LEFT: i32 = 84;
 const RIGHT: i32 = 150;
 const TOP: i32 = 56;
 const BOTTOM: i32 = 60;
-/// Least distance of two labels.
+/// Minimum distance between two labels.
 const LINE: i32 = 17;
 
 /// A curve: name, and a value per row.
@@ -204,7 +204,7 @@ fn draw(rows: &[SizeRow], title: &str, text: &mut String) -> Drawn {
         let held = rows.iter().map(|r| per(r.memory.components[k].held, r)).collect();
         memory.push((component.name.into(), held));
     }
-    // One below the other, so that a narrow screen shows them large enough.
+    // Panels are stacked vertically, so that they are large enough on a narrow screen.
     panel(&root, 0, rows, &times, "ns per contact", &|v| digits_short(v))?;
     panel(&root, PANEL.1, rows, &memory, "bytes held per contact", &|v| digits_short(v))?;
     root.present()?;
@@ -227,7 +227,7 @@ fn panel(
     let (left, right) = (LEFT, PANEL.0 - RIGHT);
     let (top, bottom) = (above + TOP, above + PANEL.1 - BOTTOM);
     let contacts: Vec<f64> = rows.iter().map(|r| r.counts.contacts.max(1) as f64).collect();
-    // What is nothing at some size has no place on a logarithmic axis, and none matters below 0.1.
+    // Zero has no place on a logarithmic axis, and values below 0.1 do not matter.
     let shown = |value: &f64| value.is_finite() && *value >= 0.1;
     let values: Vec<f64> = curves.iter().flat_map(|c| c.1.iter().copied().filter(shown)).collect();
     let (x, y) = (LogScale::of(contacts.iter().copied(), 7), LogScale::of(values.iter().copied(), 8));
@@ -237,7 +237,7 @@ fn panel(
     write_upwards(area, name, (20, (top + bottom) / 2), 15)?;
     let mut ends = Vec::new();
     for (i, (name, values)) in curves.iter().enumerate() {
-        // The first is the sum.
+        // The first curve is the sum.
         let (color, width) = if i == 0 { (INK, 3) } else { (color(i - 1), 2) };
         let points: Vec<(i32, i32)> = contacts
             .iter()
@@ -251,7 +251,7 @@ fn panel(
         if let Some(&end) = points.last() {
             ends.push((end, name, color));
         }
-        // Colors come again after eight.
+        // Colors repeat after eight.
         match i {
             0..=8 => area.draw(&PathElement::new(points, color.stroke_width(width)))?,
             _ => area.draw(&DashedPathElement::new(points, 6, 4, color.stroke_width(width)))?,
@@ -260,7 +260,7 @@ fn panel(
     ends.sort_by_key(|(end, ..)| end.1);
     let (mut free, count) = (top, ends.len() as i32);
     for (i, ((px, py), name, color)) in ends.into_iter().enumerate() {
-        // Room for those that are still to come.
+        // Leave room for the remaining labels.
         let y = py.max(free).min(bottom - LINE * (count - 1 - i as i32)).max(free);
         area.draw(&PathElement::new(vec![(px, py), (right + 14, y)], color.mix(0.5).stroke_width(1)))?;
         write(area, name, (right + 18, y), 15, HPos::Left)?;

@@ -1,11 +1,11 @@
-//! Many copies of a scene that never meet.
+//! Many copies of a scene that never touch.
 
 use crate::engine::solvers::{DEFAULT, find};
 use crate::engine::world::Settings;
 use crate::lab::error::Error;
 use crate::lab::scenes::{Scene, SceneJoint};
 
-/// Air between copies (m).
+/// Gap between copies (m).
 const AIR: f64 = 1.0;
 
 /// `count` copies of a scene on a grid about as wide as high, far enough apart not to touch.
@@ -33,7 +33,7 @@ pub fn islands(scene: &Scene, count: usize) -> Result<Scene, Error> {
             b: first + joint.b,
             ..joint
         }));
-        // About the origin, where positions have most digits.
+        // Centered at the origin, where positions are most precise.
         let x = ((copy % columns) as f64 - 0.5 * (columns - 1) as f64) * width;
         let y = ((copy / columns) as f64 - 0.5 * (rows - 1) as f64) * height;
         bodies.extend(scene.bodies.iter().cloned().map(|mut body| {

@@ -11,21 +11,22 @@ pub enum Limit {
     Compute,
     /// Neither: chains of dependent operations, gathers, branches.
     Latency,
-    /// Not bandwidth; operations are not counted in this phase.
+    /// Not bandwidth. Operations are not counted in this phase, so compute and latency cannot be
+    /// distinguished.
     NotBandwidth,
-    /// The noise of the ceilings and of the passes covers more than one verdict.
+    /// Within the noise of the ceilings and of the passes, more than one verdict is possible.
     CannotTell,
 }
 
-/// By how much a ceiling may be off (1): measured twice on a shared machine, bandwidths differ by a tenth.
+/// Relative error of a ceiling (1): measured twice on a shared machine, bandwidths differ by a tenth.
 const NOISE: f64 = 0.1;
 
-/// A phase that reaches this share of its lower ceiling is bound by it (1).
+/// A phase that reaches this fraction of a ceiling is bound by it (1).
 pub const REACHED: f64 = 0.5;
 
 impl Limit {
-    /// Of a phase whose ceilings were measured: its bandwidth, and `multiply_adds` (GFLOP/s). None of a
-    /// phase that does nothing, or without ceilings.
+    /// The limit of a phase, from its bandwidth and `multiply_adds` (GFLOP/s). `None` if the phase does
+    /// nothing or ceilings were not measured.
     pub fn of(phase: &PhaseReport, multiply_adds: Option<f64>) -> Option<Limit> {
         let peak = multiply_adds?;
         let bandwidth = phase.bandwidth?.of_mix(&phase.traffic);
@@ -34,7 +35,7 @@ impl Limit {
         }
         let memory = phase.traffic.total() / bandwidth / phase.pass_ns;
         let arithmetic = phase.flops.map(|flops| flops / peak / phase.pass_ns);
-        // Ceilings vary from run to run as the clock of the machine does, and each on its own.
+        // Ceilings vary from run to run with the machine's clock, independently of each other.
         let noise = 1.0 + NOISE + phase.spread_ns / phase.pass_ns;
         let corners =
             [(noise, 1.0 / noise), (1.0 / noise, noise), (noise, noise), (1.0 / noise, 1.0 / noise)];
@@ -44,7 +45,7 @@ impl Limit {
         Some(if is_sure { own } else { Limit::CannotTell })
     }
 
-    /// From the shares of both ceilings that are reached (1).
+    /// From the fractions of both ceilings that are reached (1).
     fn at(memory: f64, arithmetic: Option<f64>) -> Limit {
         match arithmetic {
             None if memory >= REACHED => Limit::Bandwidth,
@@ -55,7 +56,7 @@ impl Limit {
         }
     }
 
-    /// The field's word.
+    /// The usual term, such as `latency-bound`.
     pub fn word(self) -> &'static str {
         match self {
             Limit::Bandwidth => "bandwidth-bound",
@@ -100,7 +101,7 @@ mod tests {
         let of = |pass_ns, flops| Limit::of(&phase(pass_ns, flops), Some(2.0)).map(Limit::word);
         assert_eq!(of(170.0, Some(10.0)), Some("bandwidth-bound"));
         assert_eq!(of(230.0, Some(10.0)), Some("latency-bound"));
-        // Within a tenth of half the ceiling, or of each other, the machine's mood decides.
+        // Within a tenth of half the ceiling, or of each other, the noise decides.
         assert_eq!([of(195.0, Some(10.0)), of(205.0, Some(10.0))], [Some("cannot tell"); 2]);
         assert_eq!([of(150.0, Some(190.0)), of(150.0, Some(210.0))], [Some("cannot tell"); 2]);
         // 400 operations take 200 ns.

@@ -1,10 +1,10 @@
 #![doc = include_str!("README.md")]
 //! # How it measures
 //!
-//! A phase is repeated on a state that is held still ([`crate::engine::world::HeldWorld`]), in turn with loops
-//! that measure what memory and arithmetic units can do ([`ceilings`]), so a slow spell of the machine
-//! affects all of them alike. Its operations are counted by running the same kernel source on a
-//! lane that counts ([`crate::engine::lanes::Counted`]), its bytes follow from the layout ([`traffic`]).
+//! A phase is repeated on a frozen state ([`crate::engine::world::HeldWorld`]), in turn with loops that
+//! measure the limits of memory and arithmetic units ([`ceilings`]), so a slow spell of the machine affects
+//! all of them alike. Its operations are counted by running the same kernel source on a lane that counts
+//! ([`crate::engine::lanes::Counted`]). Its bytes follow from the layout ([`traffic`]).
 //!
 //! # The roofline
 //!
@@ -31,14 +31,14 @@ use ceilings::{Buffer, MemoryLevel, levels, multiply_adds};
 use std::time::{Duration, Instant};
 use traffic::Traffic;
 
-/// The phase to repeat, and for how long.
+/// Options of a profile.
 #[derive(Clone, Debug)]
 pub struct ProfileOptions {
-    /// Phases that take turns.
+    /// Phases, which take turns.
     pub phases: Vec<Phase>,
     /// Time of the whole measurement (s).
     pub seconds: f64,
-    /// Whether to measure the machine's ceilings too. Without, nothing but the phase runs.
+    /// Whether to measure the machine's ceilings too. Without it, only the phases run.
     pub ceilings: bool,
 }
 
@@ -47,41 +47,41 @@ pub struct ProfileOptions {
 pub struct Bandwidth {
     /// Reading.
     pub read: f64,
-    /// Reading and writing back: bytes of both.
+    /// Reading and writing back; bytes of both count.
     pub update: f64,
 }
 
 impl Bandwidth {
-    /// The most bytes per nanosecond of traffic of this mix.
+    /// Bandwidth for traffic of this mix (bytes per nanosecond).
     ///
-    /// Half of an update's bytes are written. So traffic with the share w of written bytes is 2w of
-    /// updates and 1 − 2w of reads, and their times add up.
+    /// Half of an update's bytes are written. So traffic with a fraction w of written bytes consists of a
+    /// fraction 2w of updates and 1 − 2w of reads, and their times add up.
     pub fn of_mix(&self, traffic: &Traffic) -> f64 {
         let updates = (2.0 * traffic.written / traffic.total().max(1.0)).min(1.0);
         1.0 / (updates / self.update + (1.0 - updates) / self.read)
     }
 }
 
-/// One phase.
+/// Measurements of one phase.
 #[derive(Clone, Debug)]
 pub struct PhaseReport {
-    /// Its part in a step.
+    /// The phase, with its passes in a step.
     pub probe: Probe,
-    /// Bytes of one pass.
+    /// Traffic of one pass (bytes).
     pub traffic: Traffic,
     /// Median time of a pass (ns).
     pub pass_ns: f64,
-    /// Mean (ns).
+    /// Mean time of a pass (ns).
     pub mean_ns: f64,
-    /// The longest, of pieces that were timed as a whole (ns).
+    /// Longest time of a pass, over pieces that were timed as a whole (ns).
     pub longest_ns: f64,
     /// Median deviation from the median (ns).
     pub spread_ns: f64,
-    /// Passes that were timed.
+    /// Number of timed passes.
     pub passes: u64,
     /// Bandwidth of a buffer as large as the working set.
     pub bandwidth: Option<Bandwidth>,
-    /// Floating-point operations of one pass, where it works on lanes.
+    /// Floating-point operations of one pass, if it works on lanes.
     pub flops: Option<f64>,
 }
 
@@ -102,7 +102,7 @@ impl PhaseReport {
     }
 }
 
-/// Everything measured.
+/// Result of a profile.
 #[derive(Clone, Debug)]
 pub struct ProfileReport {
     /// Scene.
@@ -111,34 +111,35 @@ pub struct ProfileReport {
     pub solver: &'static str,
     /// Treatment of impacts.
     pub impacts: Impacts,
-    /// Lanes.
+    /// Lanes per instruction.
     pub lanes: usize,
     /// Substeps of a step.
     pub substeps: u32,
     /// Bodies of the scene.
     pub bodies: usize,
-    /// Counts of the step that is held still.
+    /// Counts of the frozen step.
     pub counts: StepCounts,
-    /// In the order of a step.
+    /// Phases in the order of a step.
     pub phases: Vec<PhaseReport>,
     /// Bandwidth of each level of memory.
     pub levels: Vec<(MemoryLevel, Bandwidth)>,
     /// Rate of multiply-adds at the width of the run (GFLOP/s).
     pub multiply_adds: Option<f64>,
-    /// Share of the time in which the state was brought back, between the timed repeats.
+    /// Fraction of the time spent restoring the state between the timed repeats.
     pub reset_share: f64,
     /// Time of the measurement (s).
     pub seconds: f64,
-    /// Share of it in which the thread waited for a processor, where that is known.
+    /// Fraction of that time in which the thread waited for a processor, if known.
     pub waiting: Option<f64>,
 }
 
-/// Repeats between two resets: the state drifts no further, and a reset costs about as much as one.
+/// Repeats between two resets: few enough that the state does not drift far. A reset costs about as much as
+/// one repeat.
 const REPEATS: u32 = 100;
 /// Time of a phase in one round.
 const TURN: Duration = Duration::from_millis(50);
-/// Repeats are timed in pieces of about this length, as the ceilings are: most pieces are shorter than
-/// the turns that a busy machine gives its processes, so that their median has no pause in it.
+/// Repeats are timed in pieces of about this length, as the ceilings are. Most pieces are shorter than the
+/// time slices of a busy machine, so their median contains no pause.
 const PIECE: Duration = Duration::from_micros(500);
 /// Time of one ceiling in one round.
 const CEILING: Duration = Duration::from_micros(500);
@@ -155,9 +156,9 @@ struct Entrant {
     update: Vec<f64>,
 }
 
-/// Repeats phases in turn, and between them measures the ceilings.
+/// Repeats phases in turn, and measures the ceilings between them.
 ///
-/// Phases that `probes` does not have are left out.
+/// Phases that are not in `probes` are left out.
 pub fn profile(
     frozen: &mut HeldWorld<'_>,
     probes: &[Probe],
@@ -231,7 +232,7 @@ pub fn profile(
 }
 
 impl Entrant {
-    /// One turn of the phase; returns the time of its resets.
+    /// One turn of the phase; returns the time spent on resets.
     fn turn(&mut self, frozen: &mut HeldWorld<'_>, seconds: f64) -> Duration {
         let (start, mut resets) = (Instant::now(), Duration::ZERO);
         let turn = TURN.min(Duration::from_secs_f64(seconds));
@@ -246,8 +247,8 @@ impl Entrant {
                 self.pass_ns.push(elapsed.as_nanos() as f64 / passes as f64);
                 self.passes += passes;
                 let fit = PIECE.as_nanos() as f64 / elapsed.as_nanos().max(1) as f64;
-                // No more than twice as many at once: a pause must not make all pieces small, nor
-                // a clock that stands still make one endless.
+                // The factor is limited: one pause must not make all pieces small, and a clock that stands
+                // still must not make one endless.
                 self.piece = (f64::from(times) * fit.clamp(0.5, 2.0)).clamp(1.0, f64::from(REPEATS)) as u32;
                 left -= times;
             }
@@ -262,7 +263,7 @@ impl Entrant {
         let pass_ns = median(&self.pass_ns);
         let deviations: Vec<f64> = self.pass_ns.iter().map(|t| (t - pass_ns).abs()).collect();
         let probe = self.probe;
-        // Contacts without a color take as many as the others.
+        // Contacts without a color need as many operations as the others.
         let all = if probe.counted_contacts > 0 { contacts / probe.counted_contacts as f64 } else { 1.0 };
         let flops = probe.operations.map(|o| all * o.flops() as f64 / f64::from(probe.passes));
         let bandwidth = Bandwidth { read: median(&self.read), update: median(&self.update) };

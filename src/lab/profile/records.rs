@@ -9,7 +9,7 @@ use crate::lab::metrics::Errors;
 use crate::lab::report::environment::Environment;
 use serde_json::{Value, json};
 
-/// Everything that `simpulse profile` measured.
+/// All measurements of `simpulse profile`.
 pub fn json(report: &ProfileReport, errors: Option<&Errors>) -> Value {
     let phase = |p: &super::PhaseReport| {
         json!({
@@ -52,7 +52,7 @@ pub fn json(report: &ProfileReport, errors: Option<&Errors>) -> Value {
     })
 }
 
-/// Everything that `simpulse growth` measured.
+/// All measurements of `simpulse growth`.
 pub fn growth_json(rows: &[SizeRow], verdicts: &[GrowthVerdict], waited: Option<f64>) -> Value {
     let row = |row: &SizeRow| {
         let phases: serde_json::Map<String, Value> = Phase::ALL

@@ -1,4 +1,4 @@
-//! The roofline as a picture: operations per byte against operations per second.
+//! The roofline plot: operations per byte against operations per second.
 
 use super::text::bytes;
 use super::{Bandwidth, PhaseReport, ProfileReport};
@@ -13,17 +13,17 @@ const LEFT: i32 = 84;
 const RIGHT: i32 = 250;
 const TOP: i32 = 64;
 const BOTTOM: i32 = 76;
-/// Least distance of two labels beside the panel.
+/// Minimum distance between two labels next to the panel.
 const LINE: i32 = 17;
 
-/// The picture as SVG text. Errors: a report without ceilings.
+/// The plot as SVG text. Errors: a report without ceilings.
 pub fn svg(report: &ProfileReport) -> Result<String, Error> {
     let mut text = String::new();
     draw(report, &mut text).map_err(|e| Error::invalid("roofline", e.to_string()))?;
     Ok(with_dark(&text))
 }
 
-/// A point: intensity and rate.
+/// A point of the plot: intensity and rate of a phase.
 struct RooflinePoint<'a> {
     phase: &'a PhaseReport,
     intensity: f64,
@@ -45,7 +45,7 @@ fn draw(report: &ProfileReport, text: &mut String) -> Drawn {
     write(&root, &title, (12, 20), 18, HPos::Left)?;
     let note = "thin: reading from each level of memory; thick: multiply-adds; short bars: the roof of a phase's own working set";
     write(&root, note, (12, 44), 13, HPos::Left)?;
-    // The ridges of all levels, the points, and some room.
+    // Includes the ridges of all levels, the points, and some margin.
     let ridges = report.levels.iter().map(|(_, b)| peak / b.read).filter(|r| r.is_finite());
     let xs: Vec<f64> =
         points.iter().flat_map(|p| [p.intensity / 2.0, p.intensity * 2.0]).chain(ridges).collect();
@@ -61,7 +61,7 @@ fn draw(report: &ProfileReport, text: &mut String) -> Drawn {
     for (level, bandwidth) in &report.levels {
         roof(&root, [x.limits, y.limits], bandwidth.read, peak, &at)?;
         let rate = format!("{} {} GB/s", level.name, digits(bandwidth.read));
-        // Where the roof enters the picture, from the left or from below.
+        // Where the roof enters the panel, from the left or from below.
         let enters = x.limits[0].max(y.limits[0] / bandwidth.read) * 1.12;
         let (px, py) = at(enters, enters * bandwidth.read);
         free = (py + 10).max(free + 13).min(bottom - 8);
@@ -100,7 +100,7 @@ fn roof(
     Ok(())
 }
 
-/// Points, the roof over each, and their names beside the panel, joined by thin lines.
+/// Draws the points, the roof over each, and their names next to the panel, connected by thin lines.
 fn labels(
     area: &Area,
     report: &ProfileReport,
@@ -139,7 +139,7 @@ fn labels(
     Ok(())
 }
 
-/// `0.1`, `20`, without zeros behind the point.
+/// `0.1`, `20`: a number without trailing zeros.
 fn number(value: f64) -> String {
     let text = format!("{value:.6}");
     text.trim_end_matches('0').trim_end_matches('.').to_string()

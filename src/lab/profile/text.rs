@@ -1,4 +1,4 @@
-//! What `simpulse profile` prints.
+//! The output of `simpulse profile`.
 
 use super::limit::Limit;
 use super::{PhaseReport, ProfileReport, waiting};
@@ -7,7 +7,7 @@ use crate::lab::report::table::{finish, table};
 use crate::lab::report::units::digits;
 use crate::lab::report::units::lanes;
 
-/// Phases whose arithmetic is partly outside of lanes: their operations are a lower bound.
+/// Phases with arithmetic outside of lanes: their counted operations are a lower bound.
 fn is_partly_scalar(phase: Phase) -> bool {
     matches!(phase, Phase::Prepare | Phase::Restitution)
 }
@@ -21,7 +21,7 @@ pub fn bytes(value: f64) -> String {
     }
 }
 
-/// Everything: one phase at length, several as a table.
+/// The whole report: one phase in detail, several phases as a table.
 pub fn text(report: &ProfileReport) -> String {
     let mut text = match report.phases.as_slice() {
         [phase] => single(report, phase),
@@ -37,7 +37,7 @@ pub fn text(report: &ProfileReport) -> String {
     text
 }
 
-/// The frozen state.
+/// Description of the frozen state.
 pub fn head(report: &ProfileReport) -> String {
     let c = &report.counts;
     format!(
@@ -202,7 +202,7 @@ fn ceilings(report: &ProfileReport, multiply_adds: f64) -> String {
     )
 }
 
-/// The roofline in words.
+/// The comparison with the roofline in sentences.
 fn reading(report: &ProfileReport, phase: &PhaseReport) -> String {
     let (Some(peak), Some(bandwidth)) = (report.multiply_adds, phase.bandwidth) else {
         return String::new();
@@ -238,7 +238,7 @@ fn reading(report: &ProfileReport, phase: &PhaseReport) -> String {
     )
 }
 
-/// The level of memory that holds a working set: levels are measured at half of their size.
+/// The level of memory that holds a working set. Levels are measured at half of their size.
 fn level_of(report: &ProfileReport, bytes: f64) -> &str {
     let last = report.levels.last().map_or("memory", |l| l.0.name.as_str());
     let caches = report.levels.split_last().map_or(&[][..], |(_, caches)| caches);

@@ -1,20 +1,20 @@
 //! Bytes that a pass requests.
 //!
-//! Bytes are counted each time the code requests them, in the layout that they are stored in:
+//! Bytes are counted each time the code requests them, in the layout in which they are stored:
 //!
-//! * *records*: 4 B per float of a record that the pass reads, and again per float that it writes
+//! - *records*: 4 B per float of a record that the pass reads, and again per float that it writes
 //!   (accumulated impulses); lanes without a contact are read like the others;
-//! * *indices*: 4 B per body whose row is gathered;
-//! * *rows*: 32 B per gathered row, 16 B per half row written back to a body that moves;
-//! * *joints*: records, impulses, three indices and both rows of each; of chains that are solved at once their rows and what
-//!   is eliminated;
-//! * *body passes*: what is read and written of each row and of the arrays beside it;
-//! * *pairs, collide, color*: what goes in once and what comes out once; what they look up in
-//!   between (nodes of the tree, shapes, colors of a body) is not in it, so theirs is a lower bound.
+//! - *indices*: 4 B per body whose row is gathered;
+//! - *rows*: 32 B per gathered row, 16 B per half row written back to a body that moves;
+//! - *joints*: records, impulses, three indices and both rows of each; for chains that are solved together,
+//!   their rows and the elimination's data;
+//! - *body passes*: everything read and written of each row and of the arrays that belong to it;
+//! - *pairs, collide, color*: each input and each output once. Lookups in between (nodes of the tree, shapes,
+//!   colors of a body) are not included, so these counts are lower bounds.
 //!
-//! It is not counted in cache lines, and a row that is gathered four times in a sweep counts four
-//! times though it mostly comes from a nearer cache than the records. The *working set* is what
-//! there is of all that, each byte once: it decides which level of memory has to deliver.
+//! Cache lines are not counted. A row that is gathered four times in a sweep counts four times, although it
+//! mostly comes from a nearer cache than the records. The *working set* is all of this data, each byte once.
+//! It decides which level of memory delivers the data.
 
 use crate::engine::bodies::BodyKind;
 use crate::engine::clock::Phase;
@@ -30,7 +30,7 @@ pub struct Traffic {
     pub read: f64,
     /// Bytes written.
     pub written: f64,
-    /// Bytes touched, each once.
+    /// Bytes accessed, each counted once.
     pub working_set: f64,
 }
 
@@ -43,7 +43,7 @@ impl Traffic {
 
 const ROW: f64 = size_of::<BodyRow>() as f64;
 const HALF: f64 = ROW / 2.0;
-/// The quads of a contact that the narrow phase and preparation share.
+/// Quads of a contact that are shared by the narrow phase and preparation (bytes).
 const MANIFOLD: f64 = 16.0 * (quad::HEADER + 1) as f64;
 
 /// Bytes of one pass of a phase.
@@ -61,15 +61,16 @@ pub fn of(frozen: &HeldWorld<'_>, probe: &Probe) -> Traffic {
     match probe.phase {
         Phase::Pairs => in_and_out(poses + used("bounds"), used("candidates")),
         Phase::Collide => {
-            // Six numbers of a candidate, a pose with its rests. Of a contact the header and the
-            // state of both points are read, and what the narrow phase fills is written.
+            // Read: six numbers of a candidate; a pose with its low parts; the header and the state of both
+            // points of a contact. Written: the fields that the narrow phase fills.
             let read = 24.0 * world.counts.pairs as f64 + 24.0 * bodies + 48.0 * contacts;
             in_and_out(read, 32.0 * bodies + MANIFOLD * contacts)
         }
         // Both bodies of each contact.
         Phase::Color => in_and_out(8.0 * contacts, 12.0 * world.counts.lane_slots as f64),
         Phase::Prepare => {
-            // Velocities, masses, forces, gravity: nine floats and two flags; then row and velocity increment.
+            // Velocities, masses, forces, gravity: nine floats and two flags; then row and velocity
+            // increment.
             let load = in_and_out(bodies * 38.0, rows * (ROW + HALF + damping));
             let records = constraints(frozen, probe);
             Traffic {
@@ -79,8 +80,8 @@ pub fn of(frozen: &HeldWorld<'_>, probe: &Probe) -> Traffic {
             }
         }
         Phase::Integrate => {
-            // A substep has a velocity pass (velocity, velocity increment, free velocity) and a position pass
-            // (velocity, motion): the mean of both.
+            // The mean of the two passes of a substep: the velocity pass (velocity, velocity increment, free
+            // velocity) and the position pass (velocity, motion).
             let read = (HALF + HALF + damping) + (HALF + HALF);
             let written = (HALF + HALF) + HALF;
             let set = rows * (ROW + 2.0 * HALF + damping);
@@ -105,14 +106,14 @@ pub fn of(frozen: &HeldWorld<'_>, probe: &Probe) -> Traffic {
     }
 }
 
-/// Records and the indices of the rows that sweeps gather.
+/// Records, and indices of the rows that sweeps gather (bytes).
 fn used_by_sweeps(frozen: &HeldWorld<'_>) -> f64 {
     let work = frozen.workspace();
     let of_joints = work.types.iter().map(|joined| joined.bytes()).sum::<usize>();
     (work.lanes.bytes() + work.serial.bytes() + of_joints) as f64
 }
 
-/// What a pass requests of records, rows and vectors, padding included.
+/// Bytes that a pass requests of records, rows and vectors, including padding.
 fn constraints(frozen: &HeldWorld<'_>, probe: &Probe) -> Traffic {
     let work = frozen.workspace();
     let mut sum = Traffic { read: probe.bytes[0], written: probe.bytes[1], working_set: 0.0 };

@@ -1,16 +1,16 @@
-//! How long this thread has waited for a processor: time that wall-clock time attributes to whatever
-//! phase happens to run.
+//! Time in which this thread waited for a processor. Wall-clock time attributes it to whichever phase is
+//! running.
 
 pub use crate::engine::clock::waited;
 use std::time::Duration;
 
-/// Share of `elapsed` in which the thread waited since `before`.
+/// Fraction of `elapsed` in which the thread waited since `before`.
 pub fn share(before: Option<Duration>, elapsed: Duration) -> Option<f64> {
     let waiting = waited()?.saturating_sub(before?);
     Some(waiting.as_secs_f64() / elapsed.as_secs_f64().max(1e-9))
 }
 
-/// A line for reports: none where there is nothing to say.
+/// A line for reports; empty if there is nothing to report.
 pub fn note(share: Option<f64>) -> String {
     match share {
         Some(share) if share >= 0.01 => format!(

@@ -1,4 +1,4 @@
-//! Numbers of a payload: groups of seven bits, halves of an `f32`.
+//! Encoding of numbers in a payload: groups of seven bits, and halves of an `f32`.
 
 /// Appends an unsigned number.
 pub fn put(bytes: &mut Vec<u8>, mut value: u64) {
@@ -20,15 +20,15 @@ pub fn half(value: f32) -> u16 {
     if value.is_finite() { ((bits.saturating_add(0x7fff + ((bits >> 16) & 1))) >> 16) as u16 } else { 0 }
 }
 
-/// The number that [`half`] stands for.
+/// The number encoded by [`half`].
 pub fn whole(half: u16) -> f32 {
     f32::from_bits(u32::from(half) << 16)
 }
 
-/// Adler-32 of RFC 1950, which ends a zlib stream, the highest byte first.
+/// Adler-32 of RFC 1950, the last four bytes of a zlib stream, highest byte first.
 pub fn adler32(bytes: &[u8]) -> u32 {
     const PRIME: u32 = 65_521;
-    // 5552 bytes are the most whose sums fit before a remainder is taken.
+    // 5552 bytes are the most whose sums do not overflow before the remainder is taken.
     let (a, b) = bytes.chunks(5552).fold((1, 0), |(a, b), chunk| {
         let sums = chunk.iter().fold((a, b), |(a, b), &byte| (a + u32::from(byte), b + a + u32::from(byte)));
         (sums.0 % PRIME, sums.1 % PRIME)
@@ -36,7 +36,7 @@ pub fn adler32(bytes: &[u8]) -> u32 {
     (b << 16) | a
 }
 
-/// Reads from the front of a slice; nothing where it ends too early.
+/// Reads from the front of a slice; `None` at its end.
 pub struct Reader<'a> {
     bytes: &'a [u8],
 }

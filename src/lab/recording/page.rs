@@ -5,28 +5,28 @@ use crate::lab::picture::svg::escaped;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-/// Most recordings side by side.
+/// Largest number of recordings on a page.
 pub const MOST: usize = 4;
 
-/// How a replay looks.
+/// Style sheet of the player.
 pub const STYLE: &str = include_str!("replay.css");
-/// The script that plays it.
+/// Script of the player.
 pub const SCRIPT: &str = include_str!("replay.js");
 
 /// A recording on a page.
 pub struct RecordingPanel {
     /// The bytes of the file.
     pub bytes: Vec<u8>,
-    /// The run that it shows.
+    /// Description of the run.
     pub header: Header,
     /// CSS color of its curves.
     pub color: String,
 }
 
-/// The player as a part of a page that has [`STYLE`] and [`SCRIPT`]. Without JavaScript it says what
-/// it would play.
+/// The player as a part of a page that includes [`STYLE`] and [`SCRIPT`]. Without JavaScript only the
+/// captions are shown.
 ///
-/// It begins at a share of its time, in [0, 1].
+/// Playback starts at the fraction `share`, in [0, 1], of the time.
 pub fn fragment(panels: &[RecordingPanel], share: f64) -> String {
     let mut text = format!("<div class=\"replay\" data-start=\"{share}\">\n<div class=\"panels\">\n");
     for RecordingPanel { bytes, header, color } in panels {
@@ -46,7 +46,7 @@ pub fn fragment(panels: &[RecordingPanel], share: f64) -> String {
     text + "</div>\n<noscript><p>The replay needs JavaScript.</p></noscript>\n</div>\n"
 }
 
-/// A page of its own.
+/// A complete page with the player.
 pub fn page(panels: &[RecordingPanel]) -> String {
     let mut scenes: Vec<&str> = panels.iter().map(|p| p.header.scene.as_str()).collect();
     scenes.dedup();

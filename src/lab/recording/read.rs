@@ -1,4 +1,4 @@
-//! Reading a recording: everything is checked before anything is used.
+//! Reading a recording. Everything is checked before it is used.
 
 use super::binary::{Reader, adler32, whole};
 use super::{FARTHEST, FIXED, Header, LARGEST, MAGIC, NORMAL_TURN, TURN, VERSION};
@@ -8,21 +8,23 @@ use miniz_oxide::inflate::decompress_to_vec_zlib_with_limit;
 use std::f64::consts::TAU;
 use std::path::Path;
 
-/// A recording with its numbers as they were, to within a quantum.
+/// A recording with its original numbers, to within a quantum.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
-    /// The run that it was made from.
+    /// Description of the run.
     pub header: Header,
-    /// The start, then one every `header.every` steps; positions from the first body's start.
+    /// The start, then one frame every `header.every` steps. Positions are relative to the start of the first
+    /// body.
     pub frames: Vec<Frame>,
     /// Values of the curves, by frame.
     pub curves: Vec<Vec<f32>>,
 }
 
-/// Longest names in a header (bytes).
+/// Longest name in a header (bytes).
 const LONGEST: usize = 4096;
 
-/// Reads a file. Errors, in one line: it cannot be opened, or is no whole recording of this version.
+/// Reads a file. Errors, on one line: the file cannot be opened, or is not a complete recording of this
+/// version.
 pub fn read_file(path: &Path) -> Result<(Vec<u8>, Recording), Error> {
     let bytes = std::fs::read(path).map_err(Error::io(path))?;
     let format = |message| Error::Format { path: path.into(), message };
@@ -30,7 +32,7 @@ pub fn read_file(path: &Path) -> Result<(Vec<u8>, Recording), Error> {
     Ok((bytes, recording))
 }
 
-/// Reads the bytes of a file; what is wrong with them, if anything.
+/// Reads the bytes of a file. Errors: what is wrong with them.
 pub fn read(bytes: &[u8]) -> Result<Recording, String> {
     let mut fixed = Reader::new(bytes);
     if fixed.take(MAGIC.len()) != Some(&MAGIC) {
@@ -50,7 +52,7 @@ pub fn read(bytes: &[u8]) -> Result<Recording, String> {
     if payload.len() != length {
         return Err(format!("has {} bytes where it claims {length}", payload.len()));
     }
-    // The library reads zlib's checksum and leaves comparing it to its caller.
+    // The library reads zlib's checksum but leaves the comparison to its caller.
     if bytes[bytes.len() - 4..] != adler32(&payload).to_be_bytes() {
         return Err("is damaged: its checksum differs".into());
     }
@@ -78,7 +80,7 @@ pub fn read(bytes: &[u8]) -> Result<Recording, String> {
     }
 }
 
-/// Refuses what cannot be drawn.
+/// Rejects a header that cannot be drawn.
 fn check(header: &Header) -> Result<(), String> {
     let bodies = header.kinds.len();
     let names = [&header.scene, &header.solver, &header.setting, &header.outcome].into_iter();
@@ -168,7 +170,7 @@ mod tests {
         Recorder::new(world, caption, every, contacts)
     }
 
-    /// A file, and the frames that it should hold.
+    /// A file, and the frames that it should contain.
     fn run(name: &str, steps: u32, every: u32, contacts: bool) -> (Vec<u8>, Vec<Frame>) {
         let mut world = world(name);
         let stage = Stage::of(&world);
@@ -225,10 +227,10 @@ mod tests {
         let (bytes, frames) = run("stack:3", 60, 1, true);
         let found = read(&bytes).unwrap();
         for (values, frame) in found.curves.iter().zip(&frames).skip(1) {
-            // Points whose impulse is kept although they parted have no overlap.
+            // Points that have separated keep their impulse but have no overlap.
             assert!((f64::from(values[0]) - frame.deepest()).abs() < 1e-6, "{values:?}");
         }
-        // In a step of free fall from rest each body gains g h.
+        // In one step of free fall from rest, each body gains g h.
         let (bytes, _) = run("bounce", 1, 1, true);
         let speed = read(&bytes).unwrap().curves[1][2];
         assert!((speed - 10.0 / 60.0).abs() < 1e-4, "{speed}");
@@ -248,8 +250,8 @@ mod tests {
         for length in (0..bytes.len()).step_by(7).chain([bytes.len() - 1]) {
             assert!(read(&bytes[..length]).is_err(), "{length}");
         }
-        // zlib's checksum sees every change of the payload. A few bits of the compressed text have no
-        // meaning: how hard it was compressed, and what fills its last byte.
+        // zlib's checksum detects every change of the payload. A few bits of the compressed stream have no
+        // effect: the compression level, and the padding of the last byte.
         let whole = format!("{:?}", read(&bytes));
         let harmless = (0..bytes.len()).filter(|&at| {
             let mut bad = bytes.clone();

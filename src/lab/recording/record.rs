@@ -10,26 +10,26 @@ use crate::lab::metrics::overlaps::Overlaps;
 use crate::lab::picture::frame::{Frame, Stage};
 use std::f64::consts::TAU;
 
-/// Quanta in half the width of the thinnest shape that moves, at least.
+/// Minimum number of quanta in half the width of the thinnest moving shape.
 const FINENESS: f64 = 8192.0;
 
-/// Description of the run of a recording.
+/// Description of the run for a recording.
 #[derive(Clone, Debug)]
 pub struct Caption {
     /// Name of the scene.
     pub scene: String,
     /// Name of the solver.
     pub solver: String,
-    /// Its budget, order and lanes in words.
+    /// Its budget, order and lanes as text.
     pub setting: String,
 }
 
-/// Watches a world from its start and keeps what it did.
+/// Observes a world from its start and records it.
 pub struct Recorder {
     header: Header,
     stage: Stage,
     frames: Vec<u8>,
-    /// Poses of the last frame, in quanta and steps of a turn.
+    /// Poses of the last frame, in quanta and angle units.
     last: Vec<[i64; 3]>,
     overlaps: Overlaps,
     meter: Observation,
@@ -37,8 +37,8 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Begins with the world as it is, a frame every `every` steps, at least 1; with contact points
-    /// if the caller wants them. Residuals need `Settings::record_impulses`.
+    /// Starts with the current state of the world. Every `every`-th step becomes a frame (at least 1), with
+    /// contact points if `contacts`. Residuals need `Settings::record_impulses`.
     pub fn new(world: &World, caption: Caption, every: u32, contacts: bool) -> Self {
         let stage = Stage::of(world);
         let moving = stage.shapes.iter().filter(|(b, _)| stage.kinds[*b as usize] != BodyKind::Static);
@@ -84,7 +84,7 @@ impl Recorder {
         recorder
     }
 
-    /// Adds the step that the world has just taken. Errors: the recording has grown out of bounds.
+    /// Adds the step that the world has just taken. Errors: the recording has become too large.
     pub fn add(&mut self, world: &World) -> Result<(), Error> {
         self.steps += 1;
         if !self.steps.is_multiple_of(self.header.every) {
@@ -143,14 +143,14 @@ impl Recorder {
         self.header.frames += 1;
     }
 
-    /// The file, for a run that ended like this.
+    /// The file; `outcome` describes how the run ended.
     pub fn finish(mut self, outcome: &str) -> Result<Vec<u8>, Error> {
         self.header.outcome = outcome.to_string();
         file(&self.header, &self.frames)
     }
 }
 
-/// A whole file from its header and its frames.
+/// A whole file, from its header and frames.
 pub(super) fn file(header: &Header, frames: &[u8]) -> Result<Vec<u8>, Error> {
     let header = serde_json::to_vec(header).map_err(|e| Error::invalid("record", e.to_string()))?;
     let mut payload = (header.len() as u32).to_le_bytes().to_vec();

@@ -1,25 +1,25 @@
 //! The baseline of comparisons: projected Gauss–Seidel in `f64`.
 //!
-//! Near its solution the sweeps are linear while no contact changes between sticking, sliding and
-//! separation, and the error falls by the spectral radius of that map. A power iteration on the map
-//! would compute it, but where contacts outnumber what they determine the map has errors that change no
-//! velocity, and where contacts touch without load the state is a tie: both gave radii that no sweep shows.
-//! So the rate is fitted to the residuals of the sweeps themselves.
+//! Near the solution, as long as no contact changes between sticking, sliding and separation, sweeps are
+//! linear and the error falls by the spectral radius of that map. A power iteration could compute the radius.
+//! But with more contacts than the velocities determine, the map has errors that change no velocity, and
+//! contacts that touch without load are a tie. Both gave radii that no sweep shows. The rate is therefore
+//! fitted to the residuals of the sweeps.
 
 use super::problem::ContactProblem;
 use super::rates::rate;
 use super::residual::Target;
 use super::sweeps::{Stop, SweepDirection, pgs};
 
-/// Most rows that are updated on the way to the solution.
+/// Maximum number of row updates on the way to the solution.
 const MOST_UPDATES: usize = 100_000_000;
 
-/// Factor by which a forward sweep of Gauss–Seidel, in the order of the contacts and from zero, reduces the
-/// residual in the end. None where it comes to no solution, or too fast for a fit.
+/// Asymptotic reduction factor of the residual in a forward sweep of Gauss–Seidel, in the order of the
+/// contacts and from zero. `None` if the sweeps reach no solution, or converge too fast for a fit.
 pub fn gauss_seidel_rate(problem: &ContactProblem) -> Option<f64> {
-    // A block of a joint takes as long as some contacts.
+    // A joint block takes as long as several contacts.
     let count = problem.contacts.len() + 4 * problem.joint_rows();
-    // Well above the rounding floor.
+    // The tolerance is well above the rounding floor.
     let stop = Stop { tolerance: 1e-11, iterations: MOST_UPDATES / count.max(1) };
     rate(&pgs(problem, Target::Rigid, &problem.no_impulses(), SweepDirection::Forward, stop).history)
 }
@@ -42,7 +42,7 @@ mod tests {
         for ratio in [10.0, 100.0] {
             close(&heavy_on_light(ratio), ratio / (1.0 + ratio));
         }
-        // By 0.17: too fast for a fit.
+        // The factor is 0.17: too fast for a fit.
         assert_eq!(gauss_seidel_rate(&sliding_box()), None);
     }
 }

@@ -1,13 +1,14 @@
-//! References: solutions that are accepted only with evidence.
+//! Reference solutions, which are accepted only with evidence.
 //!
-//! A solution becomes a reference if its certificate holds, a natural-map residual of at most [`CERTIFIED`] measured
-//! by [`super::residual`], which shares nothing with the methods; or if two methods of different families agree on
-//! velocities to [`AGREED`] in the mass norm. What was found is stored with it.
+//! A solution becomes a reference if its natural-map residual is at most [`CERTIFIED`], measured by
+//! [`super::residual`], which shares no code with the methods. It is also accepted if two methods of
+//! different families agree on the velocities to [`AGREED`] in the mass norm. The evidence is stored with the
+//! solution.
 //!
-//! Impulses of a hyperstatic pile are an affine family; velocities v⁺ and net body impulses Jᵀλ are unique without
-//! friction (a strictly convex problem in v). With friction even velocities may not be: then only the residual
-//! decides whether a solution is right. So [`Reference::compare`] never compares single impulses, and [`Uniqueness`]
-//! tells whether a distance is meaningful.
+//! Impulses of a hyperstatic pile form an affine family. Velocities v⁺ and net body impulses Jᵀλ are unique
+//! without friction (a strictly convex problem in v). With friction even velocities may not be unique; then
+//! only the residual decides whether a solution is right. [`Reference::compare`] therefore never compares
+//! single impulses, and [`Uniqueness`] states whether a distance is meaningful.
 
 use super::joints::impulse_sizes;
 use super::newton::newton;
@@ -22,12 +23,12 @@ use std::fmt;
 
 /// Largest natural-map residual of a certified reference (1), see [`certify`].
 pub const CERTIFIED: f64 = 1e-11;
-/// Largest relative mass-norm distance of velocities that agree (1).
+/// Largest relative mass-norm distance at which velocities agree (1).
 pub const AGREED: f64 = 1e-8;
-/// Most contacts that are given to Lemke's method, whose work grows with their cube.
+/// Maximum number of contacts for Lemke's method, whose work grows with their cube.
 pub const LEMKE_CONTACTS: usize = 150;
 
-/// Most rows of joints that are eliminated before it, whose work grows with their cube.
+/// Maximum number of joint rows to eliminate before Lemke's method. The work grows with their cube.
 pub const LEMKE_ROWS: usize = 450;
 
 /// A family of methods.
@@ -55,43 +56,43 @@ impl fmt::Display for Method {
     }
 }
 
-/// Whether the velocities are the only ones.
+/// Whether the velocities are unique.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Uniqueness {
-    /// No friction: the velocities solve a strictly convex problem.
+    /// Without friction, the velocities solve a strictly convex problem.
     Proven,
-    /// Two families found the same velocities.
+    /// Two families of methods found the same velocities.
     Agreed,
-    /// Two families found different velocities, each certified: only a residual can judge.
+    /// Two families found different velocities, each certified: only a residual can decide.
     Multiple,
-    /// Only one family found an answer.
+    /// Only one family found a solution.
     Unknown,
 }
 
-/// A second answer that was compared.
+/// A second solution, for comparison with the reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Witness {
-    /// The method that found it.
+    /// Method of this solution.
     pub method: Method,
-    /// Its own residual (1).
+    /// Natural-map residual of this solution (1).
     pub natural_map: f64,
     /// Relative mass-norm distance of its velocities from the reference (1).
     pub distance: f64,
 }
 
-/// Why a reference was accepted.
+/// Evidence for a reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Certificate {
-    /// The method that found it.
+    /// Method of the reference solution.
     pub method: Method,
     /// Natural-map residual, see [`certify`] (1).
     pub natural_map: f64,
-    /// The answer of another family, if it came near one.
+    /// The solution of another family, if one ended with finite impulses.
     pub witness: Option<Witness>,
-    /// Whether the velocities are the only ones.
+    /// Whether the velocities are unique.
     pub uniqueness: Uniqueness,
 }
 
@@ -101,13 +102,14 @@ pub struct Certificate {
 pub struct Reference {
     /// v⁺ (m/s, m/s, rad/s), one per body.
     pub velocities: Vec<Velocity>,
-    /// λ (N·s), one per contact, then (λ, 0) of every row of joints; one of many if the problem is hyperstatic.
+    /// λ (N·s), one per contact, then (λ, 0) of every joint row. One of many solutions if the problem is
+    /// hyperstatic.
     pub impulses: Vec<DPair>,
-    /// Why it was accepted.
+    /// Evidence for the solution.
     pub certificate: Certificate,
 }
 
-/// No method found an answer with sufficient evidence.
+/// Error: no method found a solution with sufficient evidence.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("no reference for '{}': {why}", plain(problem))]
 pub struct NoReference {
@@ -122,13 +124,13 @@ pub struct NoReference {
 pub struct ReferenceErrors {
     /// [`ContactProblem::velocity_error`] (1).
     pub velocity: f64,
-    /// ‖M⁻¹ Jᵀ (λ − λ_ref)‖ in the mass norm, by the same scale (1): like `velocity`, but read from
-    /// the impulses.
+    /// ‖M⁻¹ Jᵀ (λ − λ_ref)‖ in the mass norm, with the same scale (1): like `velocity`, but computed from the
+    /// impulses.
     pub body_impulse: f64,
 }
 
 impl Reference {
-    /// Distance of an answer from this reference.
+    /// Distance of a solution from this reference.
     pub fn compare(
         &self,
         problem: &ContactProblem,
@@ -141,7 +143,8 @@ impl Reference {
         }
     }
 
-    /// Checks this reference against the problem afresh; says what does not hold.
+    /// Checks this reference against the problem from scratch. Errors: a description of the violated
+    /// condition.
     pub fn check(&self, problem: &ContactProblem) -> Result<(), String> {
         if (self.velocities.len(), self.impulses.len()) != (problem.bodies.len(), problem.unknowns()) {
             let (contacts, rows) = (problem.contacts.len(), problem.joint_rows());
@@ -158,7 +161,7 @@ impl Reference {
         if residual.is_nan() || residual > bound {
             return Err(format!("the reference has a natural-map residual of {residual:e}, not {bound:e}"));
         }
-        // Velocities follow from the impulses to rounding.
+        // Velocities must follow from the impulses up to rounding.
         let defect = problem.velocity_error(&problem.velocities(&self.impulses), &self.velocities);
         if defect.is_nan() || defect > 1e-12 {
             return Err(format!("the velocities of the reference are {defect:e} off its impulses"));
@@ -173,7 +176,7 @@ impl Reference {
 }
 
 /// Natural-map residual of impulses under the rigid law, relative to the larger of
-/// [`ContactProblem::impulse_unit`] and the largest impulse: both below the total load, so that the
+/// [`ContactProblem::impulse_unit`] and the largest impulse. Both are below the total load, so the
 /// certificate of a large pile is no weaker than that of a small one.
 pub fn certify(problem: &ContactProblem, impulses: &[DPair]) -> f64 {
     let largest = impulse_sizes(problem, impulses);
@@ -188,11 +191,12 @@ struct Attempt {
     impulses: Vec<DPair>,
 }
 
-/// Solves by one method; none if it ended without impulses. Budgets grow no worse than linearly
-/// with the number of contacts.
+/// Solves by one method; `None` if it ended without finite impulses. Budgets grow at most linearly with the
+/// number of contacts.
 fn attempt(problem: &ContactProblem, method: Method) -> Option<Attempt> {
     let cold = problem.no_impulses();
-    // Two decades below the certificate, whose scale is at least as large as that of the history.
+    // Two decades below the certificate. The scale of the certificate is at least as large as that of the
+    // history.
     let stop = |iterations| Stop { tolerance: 0.01 * CERTIFIED, iterations };
     let impulses = match method {
         Method::StewartTrinkle => stewart_trinkle(problem, Target::Rigid).ok()?,
@@ -205,10 +209,10 @@ fn attempt(problem: &ContactProblem, method: Method) -> Option<Attempt> {
     natural_map.is_finite().then_some(Attempt { method, natural_map, velocities, impulses })
 }
 
-/// A solution of the rigid contact law, with its certificate.
+/// Solves the rigid contact law and certifies the solution.
 ///
-/// Methods run in the order Stewart–Trinkle (small problems), NNCG, Newton, PGS, until two are
-/// certified or all are spent; the first certified one is the reference and the other its witness.
+/// Methods run in the order Stewart–Trinkle (small problems), NNCG, Newton, PGS, until two are certified or
+/// all have run. The first certified solution is the reference, the other one its witness.
 pub fn reference(problem: &ContactProblem) -> Result<Reference, NoReference> {
     let fail = |why| NoReference { problem: problem.name.clone(), why };
     problem.validate().map_err(|e| fail(e.to_string()))?;
@@ -224,7 +228,7 @@ pub fn reference(problem: &ContactProblem) -> Result<Reference, NoReference> {
             break;
         }
     }
-    // Stable: among the certified the earlier method stays first, the others follow by residual.
+    // The sort is stable: certified solutions keep the order of the methods, the others follow by residual.
     found.sort_by(|a, b| a.natural_map.max(CERTIFIED).total_cmp(&b.natural_map.max(CERTIFIED)));
     let mut found = found.into_iter();
     let Some(best) = found.next() else { return Err(fail("every method failed".into())) };
@@ -256,7 +260,7 @@ pub fn reference(problem: &ContactProblem) -> Result<Reference, NoReference> {
     };
     let certificate = Certificate { method: best.method, natural_map: best.natural_map, witness, uniqueness };
     let found = Reference { velocities: best.velocities, impulses: best.impulses, certificate };
-    // Numbers near the end of the range overflow in the norms and not in the residual.
+    // Numbers near the end of the range overflow in the norms, but not in the residual.
     found.check(problem).map_err(fail)?;
     Ok(found)
 }
@@ -294,7 +298,7 @@ mod tests {
 
     #[test]
     fn comparison_ignores_self_stress() {
-        // A squeeze between the walls of a wedge: λn ± equal, no net impulse.
+        // A squeeze between the walls of a wedge adds equal λn on both sides and no net impulse.
         let p = wedge(0.0, 0.5);
         let r = reference(&p).unwrap();
         let squeezed: Vec<DPair> = r.impulses.iter().map(|l| [l[0] + 1.0, l[1]]).collect();
@@ -302,13 +306,13 @@ mod tests {
         assert!(c.velocity < 1e-14 && c.body_impulse < 1e-14, "{c:?}");
         let mut pushed = r.velocities.clone();
         pushed[0][1] += 0.5;
-        // 0.5 m/s relative to g h = 1/24 m/s, or to a reference that falls that fast: 12.
+        // 0.5 m/s relative to g h = 1/24 m/s, or to a reference that falls at that speed: 12.
         assert!((r.compare(&p, &pushed, &r.impulses).velocity - 12.0).abs() < 1e-9);
     }
 
     #[test]
     fn both_answers_of_a_jammed_block_hold() {
-        // Between parallel walls a block may fall freely or hang: velocities are not unique.
+        // Between parallel walls a block may fall freely or hang, so velocities are not unique.
         let p = wedge(0.0, 0.5);
         let load = GRAVITY * p.h;
         let falls = [[0.0, 0.0]; 2];
@@ -335,7 +339,7 @@ mod tests {
 
     #[test]
     fn inconsistent_data_have_no_reference() {
-        // A body squeezed from both sides by walls that close: un ≥ 0 is impossible on both.
+        // A body squeezed by closing walls on both sides: un ≥ 0 is impossible on both.
         let mut p = wedge(0.0, 0.0);
         p.contacts.iter_mut().for_each(|c| c.rebound = 1.0);
         let e = reference(&p).unwrap_err();

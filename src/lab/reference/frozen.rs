@@ -1,8 +1,8 @@
-//! Frozen problems: contact problems in files, with their certified solution.
+//! Frozen problems: files with contact problems and their certified solutions.
 //!
 //! # Format
 //!
-//! UTF-8 text of two lines, each a JSON object and ended by a line feed. The first is the header:
+//! UTF-8 text of two lines. Each line is a JSON object that ends with a line feed. The first is the header:
 //!
 //! ```text
 //! {"format":"simpulse-frozen","version":1,"bytes":4711,"checksum":"fnv1a64:0123456789abcdef"}
@@ -11,31 +11,31 @@
 //! | key | meaning |
 //! |---|---|
 //! | `format` | always `simpulse-frozen` |
-//! | `version` | 1, or 2 with joints; a reader refuses larger ones |
+//! | `version` | 1, or 2 with joints; readers reject larger ones |
 //! | `bytes` | length of the second line without its line feed |
-//! | `checksum` | FNV-1a, 64 bits, of those bytes: 16 lower-case hexadecimal digits |
+//! | `checksum` | FNV-1a, 64 bits, of these bytes: 16 lower-case hexadecimal digits |
 //!
 //! The second line is the payload. Units are SI; vectors are arrays (x, y); velocities of bodies are
 //! arrays (vx, vy, w); pairs are arrays (normal, tangential), with t = (n_y, −n_x).
 //!
 //! | key | meaning |
 //! |---|---|
-//! | `problem.name` | what it is |
+//! | `problem.name` | description of the problem |
 //! | `problem.h` | step (s) |
-//! | `problem.bodies[]` | bodies that are not static: `inv_mass` (1/kg), `inv_inertia` (1/(kg·m²)), `velocity` before the step, `free_velocity` v* it would have after it without contacts |
+//! | `problem.bodies[]` | non-static bodies: `inv_mass` (1/kg), `inv_inertia` (1/(kg·m²)), `velocity` before the step, `free_velocity` v* after the step without contacts |
 //! | `problem.contacts[]` | contact points: `body_a`, `body_b` (index, or null for static), `manifold`, `normal` (from a to b), `arm_a`, `arm_b` (r × n, r × t; m), `gap` (m, negative is overlap), `friction`, `rebound` (m/s), `warm_impulse` (N·s) |
-//! | `problem.joints[]` | version 2: joints in the order in which they are solved: `body_a`, `body_b`, `reach` (\|r_a\|, \|r_b\|; m), `blocks` |
-//! | `….blocks[]` | rows that are solved together: `law` and one to three `rows` |
+//! | `problem.joints[]` | version 2: joints in the order of solving: `body_a`, `body_b`, `reach` (\|r_a\|, \|r_b\|; m), `blocks` |
+//! | `….blocks[]` | rows solved together: `law` and one to three `rows` |
 //! | `….law` | `"rigid"`, `"limit"`, `{"motor":{"speed","cap"}}` or `{"spring":{"stiffness","damping","cap"}}`: u (m/s or rad/s), F h (N·s or N·m·s), S (1/s), D (1); a spring without `cap` has no bound |
 //! | `….rows[]` | `axis` d (a unit vector, or zero for an angle), `arm_a`, `arm_b` (r × d in m, or 1), `error` C (m or rad), `warm_impulse` (N·s or N·m·s) |
 //! | `reference` | null, or the solution of the rigid law |
 //! | `reference.velocities[]` | v⁺ of every body |
-//! | `reference.impulses[]` | (λn, λt) of every contact (N·s), then (λ, 0) of every row of joints |
+//! | `reference.impulses[]` | (λn, λt) of every contact (N·s), then (λ, 0) of every joint row |
 //! | `reference.certificate` | `method`, `natural_map`, `witness` (null, or `method`, `natural_map`, `distance`), `uniqueness` |
 //!
-//! Numbers are decimal in the shortest form that reads back as the same `f64`, so writing and
-//! reading keep every bit. A file that is cut short, altered, newer, or whose reference does not
-//! solve its problem is refused. What rows, blocks and laws mean is derived in [`super::joints`].
+//! Numbers are decimal in the shortest form that reads back as the same `f64`, so writing and reading keep
+//! every bit. A file is rejected if it is truncated, altered or newer, or if its reference does not solve its
+//! problem. Rows, blocks and laws are derived in [`super::joints`].
 
 use super::certify::Reference;
 use super::problem::ContactProblem;
@@ -47,10 +47,10 @@ use std::path::Path;
 
 /// Value of `format` in the header.
 pub const FORMAT: &str = "simpulse-frozen";
-/// Newest version that this crate reads: that of problems with joints. Others have version 1.
+/// Newest version that this crate reads, used for problems with joints. Others have version 1.
 pub const VERSION: u64 = 2;
 
-/// A contact problem and, if it is known, its solution.
+/// A contact problem with its solution, if it is known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Frozen {
@@ -60,7 +60,7 @@ pub struct Frozen {
     pub reference: Option<Reference>,
 }
 
-/// Later versions may add keys, so that unknown ones are let through until the version is known.
+/// Later versions may add keys, so unknown ones are accepted until the version is checked.
 #[derive(Serialize, Deserialize)]
 struct FrozenHeader {
     format: String,
@@ -70,7 +70,7 @@ struct FrozenHeader {
 }
 
 impl Frozen {
-    /// The text of the file; refuses invalid problems and references that do not hold.
+    /// The text of the file. Errors: an invalid problem, or a reference that does not hold.
     pub fn to_text(&self) -> Result<String, Error> {
         self.validate()?;
         let payload = serde_json::to_string(self).map_err(|e| Error::invalid("payload", e.to_string()))?;
@@ -84,11 +84,11 @@ impl Frozen {
         Ok(format!("{header}\n{payload}\n"))
     }
 
-    /// Reads the text of a file; `path` is named in errors.
+    /// Parses the text of a file. Errors name `path`.
     pub fn from_text(text: &str, path: &Path) -> Result<Self, Error> {
         let refuse = |message: String| Error::Format { path: path.into(), message };
         let (first, rest) = text.split_once('\n').unwrap_or((text, ""));
-        // Format and version come first: the rest of the header depends on them.
+        // Format and version are checked first, because the rest of the header depends on them.
         let header: serde_json::Value = serde_json::from_str(first)
             .map_err(|e| refuse(format!("not a frozen problem: the first line is no JSON header ({e})")))?;
         if header["format"] != FORMAT {
@@ -134,7 +134,7 @@ impl Frozen {
         Ok(frozen)
     }
 
-    /// Writes the file as a whole: a reader sees the old file or the new one, never a part.
+    /// Writes the file atomically: readers see the old file or the new one, never a part.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         files::write(path, self.to_text()?.as_bytes())
     }
@@ -162,7 +162,8 @@ impl Frozen {
     }
 }
 
-/// FNV-1a, 64 bits. Each step is a bijection of the state, so a single altered byte always shows.
+/// FNV-1a, 64 bits. Each step is a bijection of the state, so a single altered byte always changes the
+/// result.
 fn checksum(bytes: &[u8]) -> String {
     let hash = bytes
         .iter()
@@ -188,7 +189,7 @@ mod tests {
 
     #[test]
     fn checksum_matches_published_vectors() {
-        // Fowler, Noll & Vo's own test vectors for 64-bit FNV-1a.
+        // Test vectors for 64-bit FNV-1a by Fowler, Noll and Vo.
         assert_eq!(checksum(b""), "fnv1a64:cbf29ce484222325");
         assert_eq!(checksum(b"a"), "fnv1a64:af63dc4c8601ec8c");
         assert_eq!(checksum(b"foobar"), "fnv1a64:85944171f73967e8");
@@ -212,7 +213,7 @@ mod tests {
     #[test]
     fn every_truncation_is_refused() {
         let text = sample().to_text().unwrap();
-        // The last byte is a line feed, which may be missing.
+        // The last byte is an optional line feed.
         for end in (0..text.len() - 1).filter(|&i| text.is_char_boundary(i)) {
             assert!(refusal(&text[..end]).starts_with("some/file.frozen: "), "{end}");
         }

@@ -1,18 +1,17 @@
-//! Contact problems whose solution can be derived by hand.
+//! Contact problems with hand-derived solutions.
 //!
-//! All start from rest unless stated, with gravity 10 m/s² downward; each function derives its
-//! solution in its docs. They are the material for tests of references and for exact
-//! convergence rates.
+//! All start from rest unless stated, with gravity 10 m/s² downward. The docs of each function derive its
+//! solution. The problems are used to test references and to check exact convergence rates.
 
 use super::joints::{BlockLaw, ProblemBlock, ProblemJoint, ProblemRow};
 use super::problem::{ContactProblem, ProblemBody, ProblemContact, Velocity};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// m/s²
+/// Gravitational acceleration (m/s²).
 pub const GRAVITY: f64 = 10.0;
 
-/// A problem built body by body, contact by contact, with static bodies left out.
+/// Builds a problem body by body and contact by contact. Static bodies are left out.
 struct Builder {
     problem: ContactProblem,
     centers: Vec<[f64; 2]>,
@@ -36,7 +35,8 @@ impl Builder {
         self.problem.bodies.len() as u32 - 1
     }
 
-    /// A contact at `point` in a manifold of its own, `normal` from a to b; `None` is static.
+    /// A contact at `point` in a manifold of its own, with `normal` from a to b. `None` stands for a static
+    /// body.
     fn contact(&mut self, a: Option<u32>, b: Option<u32>, point: [f64; 2], normal: [f64; 2], friction: f64) {
         let manifold = self.problem.contacts.last().map_or(0, |c| c.manifold + 1);
         let r = [a, b].map(|body| {
@@ -56,7 +56,7 @@ impl Builder {
 }
 
 impl Builder {
-    /// A hinge at `point`; its place among the joints.
+    /// Adds a hinge at `point` and returns its index among the joints.
     fn hinge(&mut self, a: Option<u32>, b: u32, point: [f64; 2]) -> usize {
         let r = [a, Some(b)].map(|body| {
             let [x, y] = body.map_or(point, |body| self.centers[body as usize]);
@@ -66,7 +66,7 @@ impl Builder {
         self.problem.joints.len() - 1
     }
 
-    /// One more row of the angle of a joint, solved before the others.
+    /// Adds an angular row to a joint, solved before its other rows.
     fn angle(&mut self, joint: usize, law: BlockLaw, error: f64) {
         let row = ProblemRow { axis: [0.0; 2], arm_a: 1.0, arm_b: 1.0, error, warm_impulse: 0.0 };
         self.problem.joints[joint].blocks.insert(0, ProblemBlock { law, rows: vec![row] });
@@ -97,9 +97,9 @@ pub fn column(masses: &[f64]) -> ContactProblem {
     p.problem
 }
 
-/// `n` equal discs of 1 kg. G is tridiagonal, and the Jacobi iteration matrix is the random walk
-/// that reflects at the ground and is absorbed above the top: with θ = π/(2n) its spectral radius
-/// is cos θ, and that of Gauss–Seidel (consistently ordered, Young 1954) is cos² θ.
+/// `n` equal discs of 1 kg. G is tridiagonal, and the Jacobi iteration matrix is a random walk that reflects
+/// at the ground and is absorbed above the top. With θ = π/(2n) its spectral radius is cos θ. That of
+/// Gauss–Seidel (consistently ordered, Young 1954) is cos² θ.
 pub fn disc_column(n: usize) -> ContactProblem {
     column(&vec![1.0; n])
 }
@@ -119,9 +119,9 @@ pub fn light_on_heavy(ratio: f64) -> ContactProblem {
     problem
 }
 
-/// A box of 2 kg, 1 m × 1 m, sliding to the right at 1 m/s on the flat with µ = 0.3; contacts rear,
-/// front. Friction µ m g at half a height below the center turns the box forward:
-/// N_front,rear = m g/2 (1 ± µ) = 13 N, 7 N, and the box slows by µ g h.
+/// A box of 2 kg, 1 m × 1 m, sliding to the right at 1 m/s on level ground with µ = 0.3; contacts rear,
+/// front. Friction µ m g acts half a height below the center and turns the box forward: N_front,rear = m g/2
+/// (1 ± µ) = 13 N, 7 N. The box slows by µ g h.
 pub fn sliding_box() -> ContactProblem {
     let mut p = Builder::new("sliding box".into(), H);
     let b = p.body([0.0, 0.5], 2.0, 2.0 / 6.0, [1.0, 0.0, 0.0]);
@@ -129,8 +129,8 @@ pub fn sliding_box() -> ContactProblem {
     p.problem
 }
 
-/// A unit box at rest on a plane that falls to the left at `slope` rad, seen in the frame of the
-/// plane. It stays if µ ≥ tan θ, else gains h g (sin θ − µ cos θ) downhill (−x).
+/// A unit box at rest on a plane that descends to the left at `slope` rad, in the frame of the plane. It
+/// stays if µ ≥ tan θ, otherwise it gains h g (sin θ − µ cos θ) downhill (−x).
 pub fn block_on_incline(slope: f64, friction: f64) -> ContactProblem {
     let mut p = Builder::new(format!("block on a slope of {slope} rad, µ {friction}"), H);
     p.gravity = [-GRAVITY * slope.sin(), -GRAVITY * slope.cos()];
@@ -139,8 +139,8 @@ pub fn block_on_incline(slope: f64, friction: f64) -> ContactProblem {
     p.problem
 }
 
-/// A disc (1 kg, 0.5 m) at rest on such a plane. It rolls, gaining (2/3) h g sin θ, if
-/// µ ≥ tan θ/3, else slips and gains h g (sin θ − µ cos θ).
+/// A disc (1 kg, 0.5 m) at rest on such a plane. It rolls and gains (2/3) h g sin θ if µ ≥ tan θ/3, otherwise
+/// it slips and gains h g (sin θ − µ cos θ).
 pub fn disc_on_incline(slope: f64, friction: f64) -> ContactProblem {
     let mut p = Builder::new(format!("disc on a slope of {slope} rad, µ {friction}"), H);
     p.gravity = [-GRAVITY * slope.sin(), -GRAVITY * slope.cos()];
@@ -149,9 +149,9 @@ pub fn disc_on_incline(slope: f64, friction: f64) -> ContactProblem {
     p.problem
 }
 
-/// A plank (1 kg, 4 m × 0.2 m) on static supports at the given x (m, from its middle). It rests if
-/// they lie on both sides; with three or more of them only sum and moment of the impulses are
-/// determined. λ_max(D⁻¹G) exceeds 2 for three supports close together: Jacobi diverges.
+/// A plank (1 kg, 4 m × 0.2 m) on static supports at the given x (m, from its middle). It rests if they lie
+/// on both sides. With three or more supports, only the sum and the moment of the impulses are determined.
+/// λ_max(D⁻¹G) exceeds 2 for three supports close together: Jacobi diverges.
 pub fn plank(supports: &[f64], friction: f64) -> ContactProblem {
     let mut p = Builder::new(format!("plank on {} supports", supports.len()), H);
     let b = p.body([0.0, 0.1], 1.0, (16.0 + 0.04) / 12.0, [0.0; 3]);
@@ -161,8 +161,8 @@ pub fn plank(supports: &[f64], friction: f64) -> ContactProblem {
     p.problem
 }
 
-/// A pyramid of unit boxes of 1 kg with `base` boxes at the bottom, neighbors in a row touching.
-/// It rests; impulses are highly hyperstatic.
+/// A pyramid of unit boxes of 1 kg with `base` boxes at the bottom and touching neighbors in each row. It
+/// rests; impulses are highly hyperstatic.
 pub fn box_pyramid(base: usize, friction: f64) -> ContactProblem {
     let mut p = Builder::new(format!("pyramid of boxes, base {base}"), H);
     let mut below: Vec<u32> = Vec::new();
@@ -188,13 +188,13 @@ pub fn box_pyramid(base: usize, friction: f64) -> ContactProblem {
     p.problem
 }
 
-/// Painlevé's rod: 1 kg, half-length 1 m, leaning at θ = atan 2 with its lower end on the ground,
-/// which slides at 1 m/s so that friction (µ = 2) presses it down.
+/// Painlevé's rod: 1 kg, half-length 1 m, leaning at θ = atan 2. Its lower end slides on the ground at 1 m/s
+/// such that friction (µ = 2) presses it down.
 ///
-/// With rn = −cos θ, rt = sin θ and I = 1/3: G_nn = 1 + 3 cos² θ = 1.6, G_tt = 3.4,
-/// G_nt = −3 sin θ cos θ = −1.2. Slipping would need (1.6 − 1.2 µ) λn = g h, impossible for
-/// µ > 4/3, and lift-off un = −g h; so the end sticks, with λ = G⁻¹ (g h, 1):
-/// λn = (3.4 g h + 1.2)/4 = 0.3 + 0.85 g h, λt = 0.4 + 0.3 g h, an impact without a collision.
+/// With rn = −cos θ, rt = sin θ and I = 1/3: G_nn = 1 + 3 cos² θ = 1.6, G_tt = 3.4, G_nt = −3 sin θ cos θ =
+/// −1.2. Slipping would need (1.6 − 1.2 µ) λn = g h, impossible for µ > 4/3. Lift-off would need un = −g h.
+/// The end therefore sticks, with λ = G⁻¹ (g h, 1): λn = (3.4 g h + 1.2)/4 = 0.3 + 0.85 g h, λt = 0.4 + 0.3 g
+/// h, an impact without a collision.
 pub fn painleve_rod(h: f64) -> ContactProblem {
     let mut p = Builder::new(format!("Painlevé rod, h {h} s"), h);
     let (sin, cos) = (2.0 / 5.0f64.sqrt(), 1.0 / 5.0f64.sqrt());
@@ -203,18 +203,19 @@ pub fn painleve_rod(h: f64) -> ContactProblem {
     p.problem
 }
 
-/// `n` rods of 1 kg and 1 m that hang from each other, hinges listed from the ceiling down.
+/// `n` rods of 1 kg and 1 m hanging from each other, hinges listed from the ceiling down.
 ///
-/// Hinge i, from 0, carries the rods below it: λ = (0, (n − i) g h) on the lower one. Vertical impulses go through all centers of
-/// mass, so they turn nothing and are apart from horizontal ones, which stay zero. Among them G is that of
-/// [`disc_column`], the ceiling in the place of the ground: Gauss–Seidel converges by cos²(π/2n) per sweep. With
-/// ln cos²θ = −θ² − O(θ⁴), a residual falls to ε of itself in
+/// Hinge i, counted from 0, carries the rods below it: λ = (0, (n − i) g h) on the lower one. Vertical
+/// impulses pass through all centers of mass, so they cause no rotation and are decoupled from horizontal
+/// ones, which stay zero. For vertical impulses G is that of [`disc_column`], with the ceiling instead of the
+/// ground, so Gauss–Seidel converges by cos²(π/2n) per sweep. With ln cos²θ = −θ² − O(θ⁴), a residual falls
+/// to ε of its start in
 ///
 /// ```text
 /// k = ln ε / ln cos²(π/2n) ≈ 4 n² ln(1/ε)/π²
 /// ```
 ///
-/// sweeps: twice the links take four times as many.
+/// sweeps: twice as many links take four times as many sweeps.
 pub fn hanging_chain(n: usize) -> ContactProblem {
     let mut p = Builder::new(format!("chain of {n} hanging rods"), H);
     let mut above = None;
@@ -227,10 +228,11 @@ pub fn hanging_chain(n: usize) -> ContactProblem {
     p.problem
 }
 
-/// A rod of 1 kg and 1 m, hinged at the left end and let go at `angle` (rad) above the horizontal.
+/// A rod of 1 kg and 1 m, hinged at the left end and released at `angle` (rad) above the horizontal.
 ///
-/// With r = −½ (cos, sin) from its center to the hinge, K = 1 + 12 (r_y², −r_x r_y; ·, r_x²) in 1/kg and K λ = (0, g h). Level, K is
-/// diagonal, 1 and 1 + 12/4 = 4: the hinge bears a quarter of the weight.
+/// With r = −½ (cos, sin) from its center to the hinge, K = 1 + 12 (r_y², −r_x r_y; ·, r_x²) in 1/kg and K λ
+/// = (0, g h). If the rod is level, K is diagonal, 1 and 1 + 12/4 = 4: the hinge bears a quarter of the
+/// weight.
 pub fn pendulum_rod(angle: f64) -> ContactProblem {
     let mut p = Builder::new(format!("rod let go at {angle} rad"), H);
     let rod = p.body([0.5 * angle.cos(), 0.5 * angle.sin()], 1.0, 1.0 / 12.0, [0.0; 3]);
@@ -238,15 +240,16 @@ pub fn pendulum_rod(angle: f64) -> ContactProblem {
     p.problem
 }
 
-/// Four bodies of 1 kg, each with a joint at a bound or a spring. With g h = 1/24 m/s:
+/// Four bodies of 1 kg, each with a joint at a bound or with a spring. With g h = 1/24 m/s:
 ///
-/// * a disc of I = ½ kg·m², hinged at its center, with a motor of 10 rad/s and 0.01 N·m·s: it gives all it has and turns at
-///   0.02 rad/s; the hinge bears g h;
-/// * a level rod of 1 m, hinged at its left end, 0.1 mrad above a limit, which it meets: ω = −0.0001/h = −0.024 rad/s. Alone it would
-///   have ω* = −(g h/2)/(1/3); the limit's impulse is (ω − ω*)/3, the hinge's g h + ω/2;
+/// * a disc of I = ½ kg·m², hinged at its center, with a motor of 10 rad/s and 0.01 N·m·s: the motor reaches
+///   its maximum and the disc turns at 0.02 rad/s; the hinge bears g h;
+/// * a level rod of 1 m, hinged at its left end, 0.1 mrad above a limit, which it reaches: ω = −0.0001/h =
+///   −0.024 rad/s. Without the limit it would have ω* = −(g h/2)/(1/3). The limit's impulse is (ω − ω*)/3,
+///   the hinge's g h + ω/2;
 /// * a point on a vertical spring of S = 20/s and D = ½, stretched by 10 mm: λ = (D g h + S 0.01)/(1 + D);
-/// * a box on a floor, µ = ½, that a spring pulls to the left with 0.01 N·s at most, less than the floor's µ g h: it stays, and the
-///   floor holds it by as much.
+/// * a box on a floor with µ = ½. A spring pulls it to the left with at most 0.01 N·s, less than the floor's
+///   µ g h. It stays, and friction on the floor balances the spring.
 pub fn machine() -> ContactProblem {
     let mut p = Builder::new("joints at their bounds".into(), H);
     let disc = p.body([0.0, 0.0], 1.0, 0.5, [0.0; 3]);
@@ -263,12 +266,12 @@ pub fn machine() -> ContactProblem {
     p.problem
 }
 
-/// A wedge (1 kg, not turning) between walls leaning outwards by `half_angle` from the vertical.
-/// If it does not slip it rests with impulses that self-stress leaves undetermined:
-/// with friction, any squeeze may be added once µ > tan(half_angle).
+/// A wedge (1 kg, not rotating) between walls leaning outward by `half_angle` from the vertical. If it does
+/// not slip, it rests with impulses that self-stress leaves undetermined: with friction, any squeeze may be
+/// added once µ > tan(half_angle).
 ///
-/// At half angle 0 the walls are parallel, and every fall speed from 0 to g h has impulses: at
-/// rest 2 µ λn ≥ m g h, falling freely λ = 0. The velocities are not unique.
+/// At half angle 0 the walls are parallel, and every fall speed from 0 to g h has impulses: 2 µ λn ≥ m g h at
+/// rest, λ = 0 in free fall. The velocities are not unique.
 pub fn wedge(half_angle: f64, friction: f64) -> ContactProblem {
     let mut p = Builder::new(format!("wedge of half angle {half_angle} rad, µ {friction}"), H);
     let b = p.body([0.0, 0.0], 1.0, f64::INFINITY, [0.0; 3]);
@@ -278,10 +281,10 @@ pub fn wedge(half_angle: f64, friction: f64) -> ContactProblem {
     p.problem
 }
 
-/// The problem with everything a little off, always in the same way for the same `seed`: velocities by
-/// up to `velocity_increment`/2 (m/s, rad/s), normals by 0.5 mrad, arms by 0.5 mm, gaps from −1.4 mm to 0.6 mm,
-/// friction by 20 %. Walls that lean by chance make piles jam, with G close to singular: the hardest
-/// problems here. Their solutions are known only through their certificates.
+/// The problem with small random changes, the same for the same `seed`: velocities by up to
+/// `velocity_increment`/2 (m/s, rad/s), normals by 0.5 mrad, arms by 0.5 mm, gaps from −1.4 mm to 0.6 mm,
+/// friction by 20 %. Walls that happen to lean jam the piles, with G close to singular: the hardest problems
+/// here. Their solutions are known only through their certificates.
 pub fn shaken(mut problem: ContactProblem, seed: u64, velocity_increment: f64) -> ContactProblem {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     // 53 bits, in [−½, ½).

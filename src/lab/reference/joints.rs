@@ -1,15 +1,16 @@
-//! Joints of a problem: rows in blocks, the law of a block, and how far impulses are from it.
+//! Joints of a problem: rows in blocks, the law of a block, and the residual of impulses.
 //!
 //! # Rows
 //!
-//! A row has the error C (m or rad) and the Jacobian J of its rate, as `engine::constraints::joints::rows` states them:
+//! A row has the error C (m or rad) and the Jacobian J of its rate, as defined in
+//! `engine::constraints::joints::rows`:
 //!
 //! ```text
 //! J v = d·(v_b − v_a) + s_b ω_b − s_a ω_a
 //! ```
 //!
-//! Rows of a block are solved together, K = J M⁻¹ Jᵀ. Vectors of impulses have the pairs (λn, λt) of contacts first,
-//! then a pair (λ, 0) for every row.
+//! Rows of a block are solved together, K = J M⁻¹ Jᵀ. Vectors of impulses start with the pairs (λn, λt) of
+//! contacts, followed by a pair (λ, 0) for every row.
 //!
 //! # Laws
 //!
@@ -22,8 +23,9 @@
 //! spring   λ = Π(−K⁻¹ (S C + D J v⁺)),  |λ| ≤ F h where it is bounded
 //! ```
 //!
-//! Π is the projection on the bounds: the nearest impulse whose norm over the block is within the cap. For a single row all of
-//! them are J v + b + R λ = 0 on the box [lo, hi], with b = max(C, 0)/h, −u or (S/D) C, and R = K/D of springs.
+//! Π is the projection onto the bounds: the nearest impulse whose norm over the block is within the cap. For
+//! a single row all laws have the form J v + b + R λ = 0 on the box [lo, hi], with b = max(C, 0)/h, −u or
+//! (S/D) C, and R = K/D for springs.
 //!
 //! # Residual
 //!
@@ -37,13 +39,14 @@
 //! spring         α = q = D/(1 + D)   c = S C/(1 + D)
 //! ```
 //!
-//! which is the exact solution of the block alone. The residual r = λ − Π(y) is therefore the natural map with ρ = 1/(K + R)
-//! of the block: what one exact sweep over it would change, as for contacts. For the spring: its fixed point inside the bounds
-//! is (1 − α) λ = −K⁻¹ (c + q J v), the law times 1/(1 + D); on the bound y = (D λ + f)/(1 + D) with f = −K⁻¹(S C + D J v)
-//! points along λ and is no shorter exactly if f does and is not, so λ = Π(f).
+//! This line is the exact solution of the block alone. The residual r = λ − Π(y) is therefore the natural map
+//! with ρ = 1/(K + R) of the block: the change that one exact sweep over it would make, as for contacts. For
+//! the spring, the fixed point inside the bounds is (1 − α) λ = −K⁻¹ (c + q J v), the law times 1/(1 + D). On
+//! the bound, y = (D λ + f)/(1 + D) with f = −K⁻¹(S C + D J v). y points along λ and is no shorter than λ
+//! exactly if the same holds for f, so λ = Π(f).
 //!
-//! The residual of an angular row is an angular impulse L. It counts as the impulse P through the centers of mass that has
-//! the same energy, K L²/2 = (1/m_a + 1/m_b) P²/2: so N·s for all rows.
+//! The residual of an angular row is an angular impulse L. It counts as the impulse P through the centers of
+//! mass that has the same energy, K L²/2 = (1/m_a + 1/m_b) P²/2. All rows are therefore in N·s.
 
 use super::problem::{ContactProblem, DPair, Velocity};
 pub use super::rows::{
@@ -52,15 +55,15 @@ pub use super::rows::{
 use super::rows::{OwnRow, inverted};
 use super::target::Target;
 
-/// A block with everything that does not change with impulses.
+/// A block with all data that does not depend on impulses.
 #[derive(Clone, Debug)]
 pub(super) struct BlockLine {
     line: LawLine,
-    /// Place of its first row in vectors of impulses.
+    /// Index of its first row in vectors of impulses.
     pub first: usize,
-    /// Bodies that are not static, with their part of J, sign included.
+    /// Non-static bodies with their part of J, sign included.
     pub sides: Vec<(usize, [Velocity; ROWS])>,
-    /// Impulses to N·s (1, or 1/m of angular rows).
+    /// Factors from impulses to N·s (1, or 1/m for angular rows).
     pub scale: RowVector,
 }
 
@@ -119,19 +122,20 @@ impl BlockLine {
         [0, 1, 2].map(|i| self.scale[i] * (own[i] - exact[i]))
     }
 
-    /// Its impulses in a vector.
+    /// Its impulses, read from a vector.
     pub fn read(&self, impulses: &[DPair]) -> RowVector {
         let mut own = [0.0; ROWS];
         own.iter_mut().zip(&impulses[self.first..][..self.size]).for_each(|(own, pair)| *own = pair[0]);
         own
     }
 
-    /// Puts its impulses into a vector.
+    /// Writes its impulses into a vector.
     pub fn write(&self, own: RowVector, impulses: &mut [DPair]) {
         impulses[self.first..][..self.size].iter_mut().zip(own).for_each(|(pair, own)| pair[0] = own);
     }
 
-    /// Takes J M⁻¹ Jᵀ with each side's part times `share` of its body for the response to its own impulses: P = (α D + (1 − α) K)⁻¹.
+    /// Applies mass splitting. Multiplies each body's part of J M⁻¹ Jᵀ by the body's `share`, which gives D
+    /// for the response to its own impulses: P = (α D + (1 − α) K)⁻¹.
     pub fn split(&mut self, problem: &ContactProblem, share: &[f64]) {
         let mut d = [[0.0; ROWS]; ROWS];
         for side in &self.sides {
@@ -149,7 +153,7 @@ fn dot(a: &Velocity, b: &Velocity) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Bodies that are not static, with their part of J, sign included.
+/// Non-static bodies with their part of J, sign included.
 fn sides(joint: &ProblemJoint, block: &ProblemBlock) -> Vec<(usize, [Velocity; ROWS])> {
     let side = |body: Option<u32>, sign: f64, arm: fn(&ProblemRow) -> f64| {
         let mut rows = [[0.0; 3]; ROWS];
@@ -162,7 +166,7 @@ fn sides(joint: &ProblemJoint, block: &ProblemBlock) -> Vec<(usize, [Velocity; R
     both.into_iter().flatten().collect()
 }
 
-/// K
+/// K = J M⁻¹ Jᵀ.
 fn response(problem: &ContactProblem, sides: &[(usize, [Velocity; ROWS])]) -> [RowVector; ROWS] {
     let mut k = [[0.0; ROWS]; ROWS];
     for (body, rows) in sides {
@@ -195,7 +199,7 @@ fn apply(
 }
 
 impl ContactProblem {
-    /// Every block with its joint and the place of its first row in vectors of impulses.
+    /// Every block with its joint and the index of its first row in vectors of impulses.
     pub fn blocks(&self) -> impl Iterator<Item = (usize, &ProblemJoint, &ProblemBlock)> {
         let mut next = self.contacts.len();
         let blocks =
@@ -207,12 +211,12 @@ impl ContactProblem {
         })
     }
 
-    /// Rows of joints.
+    /// Number of joint rows.
     pub fn joint_rows(&self) -> usize {
         self.joints.iter().map(|joint| joint.rows().count()).sum()
     }
 
-    /// Length of vectors of impulses: a pair for every contact, then one for every row of joints.
+    /// Length of vectors of impulses: one pair for every contact, then one for every joint row.
     pub fn unknowns(&self) -> usize {
         self.contacts.len() + self.joint_rows()
     }
@@ -241,14 +245,14 @@ impl ContactProblem {
         rows.zip(of_rows).for_each(|(row, impulse)| row.warm_impulse = impulse[0]);
     }
 
-    /// The rigid law of every row of joints.
+    /// The rigid law of every joint row.
     pub fn rigid_rows(&self) -> impl Iterator<Item = OwnRow> {
         self.blocks().flat_map(|(_, _, block)| {
             block.rows.iter().map(|row| OwnRow { bias: row.rigid_bias(block.law, self.h), compliance: 0.0 })
         })
     }
 
-    /// The blocks under a law.
+    /// The blocks under a law, with precomputed data.
     pub(super) fn lines(&self, target: Target) -> Vec<BlockLine> {
         self.blocks().map(|(first, joint, block)| BlockLine::new(self, target, joint, block, first)).collect()
     }
@@ -278,13 +282,13 @@ impl ContactProblem {
         response(self, &sides(joint, block))
     }
 
-    /// Whether all impulses of joints are bounded row by row: then a problem without friction is convex.
+    /// Whether all joint impulses are bounded row by row. A problem without friction is then convex.
     pub(super) fn has_boxes_alone(&self) -> bool {
         self.blocks().all(|(_, _, block)| block.rows.len() == 1 || block.law.cap().is_none())
     }
 }
 
-/// Sizes of all impulses (N·s), those of angular rows as in residuals.
+/// Largest absolute impulse (N·s). Angular rows are scaled as in residuals.
 pub(super) fn impulse_sizes(problem: &ContactProblem, impulses: &[DPair]) -> f64 {
     let contacts = impulses[..problem.contacts.len()].iter().flatten().fold(0.0, |m: f64, l| m.max(l.abs()));
     let lines = problem.lines(Target::Rigid);
@@ -306,7 +310,7 @@ mod tests {
 
     const STOP: Stop = Stop { tolerance: 1e-14, iterations: 4000 };
 
-    /// Impulses of every family, all of them certified.
+    /// Impulses of every family of methods, all of them certified.
     fn solutions(p: &ContactProblem) -> Vec<(&'static str, Vec<DPair>)> {
         p.validate().unwrap();
         let (cold, law) = (p.no_impulses(), Target::Rigid);
@@ -385,8 +389,8 @@ mod tests {
         }
     }
 
-    /// A body of 1 kg at 3 m/s along x under two rows with a cap: the impulse opposes the motion, at its full size; and all of
-    /// them that a spring asks for within it.
+    /// A body of 1 kg at (3, 4) m/s under two rows with a cap. The impulse opposes the motion. It has the
+    /// size of the cap, or that of the spring's force if this is within the cap.
     #[test]
     fn a_cap_bounds_the_norm_of_a_block() {
         let mut p = pendulum_rod(0.0);
@@ -398,7 +402,7 @@ mod tests {
         p.joints[0].blocks[0].law = BlockLaw::Motor { speed: 0.0, cap: 2.5 };
         p.validate().unwrap();
         let l = solve(&p);
-        // 5 m/s along (3, 4)/5.
+        // The speed is 5 m/s along (3, 4)/5.
         close("x", l[0][0], -1.5);
         close("y", l[1][0], -2.0);
         // λ = −D v⁺ = −D (v* + λ): −(3, 4)/2 with D = 1, of norm 2.5.
@@ -409,26 +413,27 @@ mod tests {
             close("y", l[1][0], -4.0 * factor);
             let r = reference(&p).unwrap();
             close("reference", r.impulses[0][0], -3.0 * factor);
-            // Without a proof, as the law is no box: by two families, of which Lemke's is none where the cap holds.
+            // The law is not a box, so uniqueness is agreed by two families instead of proven. Lemke's method
+            // has no answer if the cap binds.
             assert_eq!(r.certificate.uniqueness, Uniqueness::Agreed);
             assert_eq!(r.certificate.method == Method::StewartTrinkle, factor == 0.5);
         }
     }
 
-    /// r = λ − Π(y) by hand, and as an impulse through the centers of mass for an angle.
+    /// r = λ − Π(y) by hand; for an angle as an impulse through the centers of mass.
     #[test]
     fn residuals_are_what_one_sweep_would_change() {
         let p = machine();
         let v = vec![[0.0; 3]; p.bodies.len()];
         let r = joint_residuals(&p, Target::Rigid, &v, &p.no_impulses());
-        // A motor that stands still: 0.01 N·m·s are missing, and count by √(K m) = √2/m.
+        // The motor stands still: 0.01 N·m·s are missing, scaled by √(K m) = √2/m.
         close("motor", r[0], -0.01 * 2.0_f64.sqrt());
-        // Hinges at rest, without load; the open limit.
+        // Unloaded hinges at rest, and the open limit.
         [1, 2, 3, 4, 5].iter().for_each(|&i| close("rest", r[i], 0.0));
         // Springs: (D λ + f)/(1 + D) with f = −S C.
         close("spring", r[6], -0.2 / 1.5);
         close("capped spring", r[7], 0.01);
-        // Pushing without need.
+        // A limit that pushes although it is open.
         let mut l = p.no_impulses();
         l[4][0] = 0.5;
         close(
@@ -442,13 +447,13 @@ mod tests {
 
     #[test]
     fn undamped_springs_and_redundant_rows_are_solved() {
-        // Without damping a spring pushes −S C, whatever happens.
+        // Without damping a spring pushes with −S C, whatever the velocity.
         let mut p = machine();
         p.joints[2].blocks[0].law = BlockLaw::Spring { stiffness: 20.0, damping: 0.0, cap: None };
         for (name, l) in solutions(&p) {
             close(name, l[7][0], 0.2);
         }
-        // A rod hung on two hinges at the same point, one as good as the other.
+        // A rod on two identical hinges at the same point.
         let mut p = pendulum_rod(0.0);
         p.joints.push(p.joints[0].clone());
         for (name, l) in solutions(&p) {

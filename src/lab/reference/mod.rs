@@ -1,18 +1,19 @@
 //! Exact and certified solutions of a contact problem.
 //!
-//! Reading order: [`problem`] states the problem, [`residual`] the law and its residual, [`joints`] those of joints. [`stewart_trinkle`] solves
-//! small problems exactly by Lemke's method ([`crate::engine::constraints::numerics::lemke`]); [`sweeps`], [`nncg`]
-//! and [`newton`], through [`sparse`], solve large ones. [`certify`] accepts a solution only with a certificate.
-//! [`statics`] decides without a time step whether rest is possible, through [`nnls`]. [`frozen`] stores problems in
-//! files, [`gallery`] has problems solved by hand, [`rates`] measures convergence in iterations and in the step size,
-//! [`baseline`] that of Gauss–Seidel.
+//! Reading order: [`problem`] states the problem, [`residual`] the law and its residual, [`joints`] those of
+//! joints. [`stewart_trinkle`] solves small problems exactly by Lemke's method
+//! ([`crate::engine::constraints::numerics::lemke`]). [`sweeps`], [`nncg`] and [`newton`], through
+//! [`sparse`], solve large ones. [`certify`] accepts a solution only with a certificate. [`statics`] decides
+//! without a time step whether rest is possible, through [`nnls`]. [`frozen`] stores problems in files,
+//! [`gallery`] contains problems solved by hand, [`rates`] measures convergence in iterations and in the step
+//! size, [`baseline`] that of Gauss–Seidel.
 //!
-//! On a linear complementarity problem PATH, with which the literature compares, pivots along the path of one covering vector as Lemke's
-//! method does, so that stands for it. There is no interior-point method: one was built, and certified no problem that Newton's and
-//! Lemke's methods had left.
+//! The literature compares with PATH. On a linear complementarity problem PATH pivots along the path of one
+//! covering vector, as Lemke's method does, so Lemke's method represents it. There is no interior-point
+//! method: one was built, and it certified no problem that Newton's and Lemke's methods had left unsolved.
 //!
-//! Nothing here depends on the simulation's solvers, so that it can judge them, except that it shares Lemke's method
-//! with `direct` and certifies the result.
+//! Nothing here depends on the solvers of the simulation, so it can judge them. The exception is Lemke's
+//! method, which is shared with `direct`; its results are certified.
 
 pub mod baseline;
 pub mod certify;

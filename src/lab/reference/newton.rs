@@ -1,6 +1,6 @@
 //! Semi-smooth Newton on the Alart–Curnier function, with a sparse factorization.
 //!
-//! Each contact is open, sticking or slipping by the sign of what its natural map clips:
+//! Each contact is open, sticking or slipping, depending on how its natural map is clipped:
 //!
 //! ```text
 //! open   λn − ρn un ≤ 0                           λn = λt = 0
@@ -8,24 +8,23 @@
 //! slip   otherwise, s = sign(λt − ρt ut)          un = 0, λt = s µ λn
 //! ```
 //!
-//! With the states fixed the law is linear: the Newton step solves, for the normal impulses of
-//! closed and the tangential ones of sticking contacts, the rows of G named on the right, a
-//! slipping contact acting along n + s µ t. In the right states it gives the solution at once.
+//! With fixed states the law is linear. The Newton step solves the rows of G named on the right for the
+//! normal impulses of closed contacts and the tangential ones of sticking contacts. A slipping contact acts
+//! along n + s µ t. In the right states, one step gives the solution.
 //!
-//! Rows of joints, J v + b + R λ = 0 within bounds, are free or at a bound, by the same sign; a block whose norm is capped
-//! is held where its projection was.
+//! Rows of joints, J v + b + R λ = 0 within bounds, are free or at a bound, by the same sign. A block at its
+//! norm cap is fixed at its projection.
 //!
 //! **Source**: Alart & Curnier 1991; Acary, Brémond & Huber 2018 (line search, proximal outer loop).
-//! **Departures**: hyperstatic contacts make the linear problem singular and their states
-//! ambiguous. So Newton solves a sequence of proximal problems (Rockafellar 1976): ε D (λ − λ_k) is
-//! added to the relative velocities, which makes G + ε D definite, and the solution is λ_{k+1}. The
-//! error falls by ε/(σ + ε) along every eigenvalue σ of D⁻¹G, and the impulses that G leaves
-//! undetermined stay where they began. ε shrinks after every success. After a failure it grows
-//! again, and Gauss–Seidel sweeps, twice as many each time, look for a better start. (Without the
-//! proximal term rounding kept switching the states of contacts on an edge: a pyramid of 40 rows
-//! stalled at a residual of 10⁻⁶.)
-//! **Fails when** a pile is jammed by friction, so that G has eigenvalues near ε that matter; then
-//! it stalls at residuals around 10⁻⁶ and [`mod@super::certify`] refuses its answer.
+//! **Departures**: hyperstatic contacts make the linear problem singular and their states ambiguous. Newton
+//! therefore solves a sequence of proximal problems (Rockafellar 1976): ε D (λ − λ_k) is added to the
+//! relative velocities, which makes G + ε D definite, and the solution is λ_{k+1}. The error falls by ε/(σ +
+//! ε) along every eigenvalue σ of D⁻¹G, and impulses that G leaves undetermined keep their initial values. ε
+//! shrinks after every success. After a failure it grows again, and Gauss–Seidel sweeps, twice as many each
+//! time, look for a better start. (Without the proximal term, rounding kept switching the states of contacts
+//! on an edge: a pyramid of 40 rows stalled at a residual of 10⁻⁶.)
+//! **Fails when** friction jams a pile, so that G has relevant eigenvalues near ε. The method then stalls at
+//! residuals around 10⁻⁶, and [`mod@super::certify`] rejects its answer.
 
 use super::joints::{BlockLine, RowVector};
 use super::problem::{ContactProblem, DPair, ProblemContact, SideRows};
@@ -34,36 +33,36 @@ use super::rows::positive;
 use super::sparse;
 use super::sweeps::{IterativeRun, Status, Stop, SweepDirection, pgs};
 
-/// Symmetric sweeps before the first Newton step; doubled every time that a problem is left unsolved.
+/// Symmetric sweeps before the first Newton step. The number doubles after every unsolved proximal problem.
 const SWEEPS: usize = 20;
-/// Most sweeps at a time.
+/// Maximum number of sweeps at a time.
 const MOST_SWEEPS: usize = 1280;
 /// First shift ε of the unit diagonal.
 const FIRST_SHIFT: f64 = 1e-3;
-/// Least shift: LU leaves noise of 10⁻¹⁶/ε in undetermined impulses, which must not switch states.
+/// Smallest shift. LU leaves noise of 10⁻¹⁶/ε in undetermined impulses, which must not switch states.
 const LEAST_SHIFT: f64 = 1e-7;
-/// Factor by which the shift falls after a solved proximal problem, and rises after an unsolved one.
+/// Factor by which the shift falls after a solved proximal problem and rises after an unsolved one.
 const SHIFT_FACTOR: f64 = 10.0;
-/// Newton steps for one proximal problem.
+/// Maximum number of Newton steps for one proximal problem.
 const STEPS: usize = 40;
 /// Halvings of a step before it counts as failed.
 const HALVINGS: usize = 6;
-/// A proximal problem is solved when its residual is this fraction of the one it started from.
+/// A proximal problem is solved if its residual falls to this fraction of its initial value.
 const INEXACT: f64 = 1e-2;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum IterateState {
     Open,
     Stick,
-    /// Direction of λt.
+    /// Slipping, with the direction of λt.
     Slip(f64),
     /// A row of a joint within its bounds.
     Free,
-    /// A row of a joint that has this impulse.
+    /// A row of a joint fixed at this impulse.
     At(f64),
 }
 
-/// Newton's method from `start`; one iteration is one proximal problem, or a bout of sweeps.
+/// Newton's method from `start`. One iteration is one proximal problem or a series of sweeps.
 pub fn newton(problem: &ContactProblem, target: Target, start: &[DPair], stop: Stop) -> IterativeRun {
     let sweep = |from: &[DPair], n: usize| {
         pgs(
@@ -97,7 +96,7 @@ pub fn newton(problem: &ContactProblem, target: Target, start: &[DPair], stop: S
     run
 }
 
-/// The contact law with ε D (λ − λ_center) added to the relative velocities, D the diagonal of G.
+/// The contact law with ε D (λ − λ_center) added to the relative velocities. D is the diagonal of G.
 struct Proximal<'a> {
     problem: &'a ContactProblem,
     law: Vec<OwnRow>,
@@ -120,7 +119,7 @@ impl<'a> Proximal<'a> {
         }
     }
 
-    /// Impulses that solve this problem well enough, or none.
+    /// Impulses that solve this problem well enough, or `None`.
     fn solve(&self) -> Option<Vec<DPair>> {
         let mut impulses = self.center.to_vec();
         let mut now = self.merit(&impulses, &self.arguments(&impulses));
@@ -179,7 +178,7 @@ impl<'a> Proximal<'a> {
         arguments
     }
 
-    /// Energy-weighted square of the natural map ∑ G_ii r_i² (J): the same in all units of mass.
+    /// Energy-weighted square of the natural map ∑ G_ii r_i² (J), independent of the unit of mass.
     fn merit(&self, impulses: &[DPair], arguments: &[DPair]) -> f64 {
         let one = |(i, c): (usize, &ProblemContact)| {
             let ([ln, lt], [yn, yt], [gn, gt]) = (impulses[i], arguments[i], self.diagonal[i]);
@@ -215,9 +214,9 @@ impl<'a> Proximal<'a> {
         states
     }
 
-    /// Solves the linear problem of fixed states; none if it cannot be factorized.
+    /// Solves the linear problem with fixed states; `None` if it cannot be factorized.
     fn solve_states(&self, states: &[IterateState]) -> Option<Vec<DPair>> {
-        // Unknowns (contact, direction); `index` finds them again.
+        // Unknowns (contact, direction). `index` maps back to them.
         let mut unknowns: Vec<(usize, usize)> = Vec::new();
         let mut index = vec![[usize::MAX; 2]; states.len()];
         for (i, state) in states.iter().enumerate() {
@@ -239,7 +238,7 @@ impl<'a> Proximal<'a> {
             Some(row) => rows[row].0.response[rows[row].1][rows[row].1],
             None => self.diagonal[i][d],
         };
-        // Rows and columns scaled by 1/√G_ii: unit diagonal.
+        // Rows and columns are scaled by 1/√G_ii, which gives a unit diagonal.
         let scale: Vec<f64> = unknowns.iter().map(|&(i, d)| 1.0 / g(i, d).sqrt()).collect();
         let slope = |i: usize| match states[i] {
             IterateState::Slip(sign) => sign * self.problem.contacts[i].friction,
@@ -304,7 +303,7 @@ impl<'a> Proximal<'a> {
         Some(impulses)
     }
 
-    /// Closed contacts and free rows of joints of every body, with their rows on that body.
+    /// Closed contacts and free joint rows of every body, with their rows on that body.
     fn rows_of_bodies(&self, states: &[IterateState]) -> Vec<Vec<(usize, SideRows)>> {
         let mut touching = vec![Vec::new(); self.problem.bodies.len()];
         for (i, c) in self.problem.contacts.iter().enumerate() {
@@ -338,7 +337,7 @@ mod tests {
 
     #[test]
     fn long_columns_take_a_step_or_two() {
-        // 60 discs: Gauss–Seidel gains a decade per 3360 sweeps.
+        // 60 discs: Gauss–Seidel takes 3360 sweeps per decade.
         let p = disc_column(60);
         let run = solve(&p);
         assert!(run.history.len() < 15, "{:?}", run.history);

@@ -1,18 +1,17 @@
 //! Nonsmooth nonlinear conjugate gradients around Gauss–Seidel sweeps.
 //!
-//! Takes the change made by a sweep as the descent direction, r = sweep(λ) − λ, and adds a
-//! multiple of the previous direction, as the Fletcher–Reeves method does with gradients.
+//! Takes the change of a sweep as the descent direction, r = sweep(λ) − λ, and adds a multiple of the
+//! previous direction, like the Fletcher–Reeves method with gradients.
 //!
 //! **Source**: Silcowitz-Hansen, Niebe & Erleben 2010, algorithm 1.
 //! **Cost**: a sweep per iteration.
-//! **Fails when** friction keeps switching: β > 1 restarts so often that it falls back to
-//! Gauss–Seidel.
+//! **Fails when** friction keeps switching: β > 1 then restarts so often that only Gauss–Seidel remains.
 
 use super::problem::{ContactProblem, DPair};
 use super::residual::Target;
 use super::sweeps::{IterativeRun, ScalarRows, Stop, gauss_seidel, iterate};
 
-/// NNCG from `start`; one iteration is a sweep and an extrapolation.
+/// NNCG from `start`. One iteration is a sweep and an extrapolation.
 pub fn nncg(problem: &ContactProblem, target: Target, start: &[DPair], stop: Stop) -> IterativeRun {
     let rows = ScalarRows::new(problem, target);
     let mut direction = problem.no_impulses();
@@ -23,7 +22,7 @@ pub fn nncg(problem: &ContactProblem, target: Target, start: &[DPair], stop: Sto
         let descent: Vec<DPair> =
             impulses.iter().zip(&before).map(|(a, b)| [a[0] - b[0], a[1] - b[1]]).collect();
         let square: f64 = descent.iter().map(|d| d[0] * d[0] + d[1] * d[1]).sum();
-        // β > 1 means that the last direction made things worse: start again from this sweep.
+        // β > 1 means that the last direction increased the residual: restart from this sweep.
         let beta = if square <= previous && square > 0.0 { square / previous } else { 0.0 };
         for ((l, p), r) in impulses.iter_mut().zip(&mut direction).zip(&descent) {
             for k in 0..2 {
@@ -59,7 +58,7 @@ mod tests {
             );
             for (i, l) in fast.impulses.iter().enumerate() {
                 let load = (n - i) as f64 / 24.0;
-                // The residual 1e-12 times the condition number, some n².
+                // The residual 1e-12 times the condition number, about n².
                 assert!((l[0] - load).abs() < 1e-9 * load, "{} is not {load}", l[0]);
             }
         }

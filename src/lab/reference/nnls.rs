@@ -1,28 +1,27 @@
-//! Non-negative least squares: the point of a cone that is nearest to a given one.
+//! Non-negative least squares: the point of a cone nearest to a given point.
 //!
-//! Minimize |p − A z| over z ≥ 0, the columns of A being the edges of the cone. z is optimal exactly if
-//! the remainder r = p − A z makes no acute angle with any edge, Aᵀ r ≤ 0, and a right one with those
-//! in use. So, beginning with none, the edge that makes the most acute angle with r joins those in use;
-//! least squares over them are solved without a sign; and where that would make weights negative, z
-//! goes toward it only until the first of them vanishes, and that edge is dropped.
+//! Minimizes |p − A z| over z ≥ 0, where the columns of A are the edges of the cone. z is optimal exactly if
+//! the remainder r = p − A z forms no acute angle with any edge, Aᵀ r ≤ 0, and a right angle with those in
+//! use. The method starts with no edges. In each round, the edge with the most acute angle to r joins those
+//! in use, and least squares over these edges are solved without sign constraints. If that makes weights
+//! negative, z moves toward the solution only until the first weight vanishes, and that edge is dropped.
 //!
-//! **Source**: Lawson and Hanson 1974 (`lawson1974`), chapter 23. Every round shortens
-//! r, so none can come back, however many ways there are to write p: degenerate cones, on which the
-//! simplex method may cycle, need no care.
-//! **Departures**: least squares by Gram–Schmidt, each column twice (`giraud2002`: enough for
-//! orthogonality to rounding), from scratch every time; a column that depends on those in use to
-//! `DEPENDENT` is passed over.
-//! **Cost**: 4 m k² a round, k ≤ m edges in use, and some k rounds; meant for a few hundred rows.
+//! **Source**: Lawson and Hanson 1974 (`lawson1974`), chapter 23. Every round shortens r, so no set of edges
+//! recurs, even if p can be written in many ways. Degenerate cones, on which the simplex method may cycle,
+//! need no special care.
+//! **Departures**: least squares by Gram–Schmidt, each column twice (`giraud2002`: enough for orthogonality
+//! to rounding), from scratch every time. A column that depends on those in use to `DEPENDENT` is skipped.
+//! **Cost**: 4 m k² per round with k ≤ m edges in use, and about k rounds; meant for a few hundred rows.
 
-/// Part of a unit column outside the span of others below which it counts as inside.
+/// A unit column counts as inside the span of others if its part outside is shorter than this.
 const DEPENDENT: f64 = 1e-11;
-/// Cosine of the angle between an edge and the remainder up to which it counts as right.
+/// Largest cosine between an edge and the remainder that counts as a right angle.
 const RIGHT_ANGLE: f64 = 1e-9;
-/// The same, absolute, for |p| = 1: r is known to some roundings.
+/// The same, absolute, for |p| = 1: r is accurate to a few roundings.
 const ROUNDING: f64 = 1e-14;
 
-/// p − A z for the z ≥ 0 that makes it shortest, A given by columns of length 1, |p| about 1; none if
-/// more than `limit` rounds were needed.
+/// p − A z for the z ≥ 0 that minimizes its length. The columns of A have length 1, and |p| is about 1.
+/// `None` if more than `limit` rounds were needed.
 pub fn remainder(columns: &[Vec<f64>], p: &[f64], limit: usize) -> Option<Vec<f64>> {
     let mut used: Vec<usize> = Vec::new();
     let mut z: Vec<f64> = Vec::new();
@@ -35,7 +34,7 @@ pub fn remainder(columns: &[Vec<f64>], p: &[f64], limit: usize) -> Option<Vec<f6
             .filter(|&(angle, _)| angle > least)
             .collect();
         candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
-        // The first whose weight grows, as all do but for rounding.
+        // The first edge with a growing weight. Only rounding prevents growth.
         let joined = candidates.into_iter().find_map(|(_, j)| {
             used.push(j);
             let solution = least_squares(columns, &used, p).filter(|(s, _)| s[used.len() - 1] > 0.0);
@@ -60,7 +59,8 @@ pub fn remainder(columns: &[Vec<f64>], p: &[f64], limit: usize) -> Option<Vec<f6
     None
 }
 
-/// Weights s of the `used` columns that make |p − A s| shortest, and p − A s; none if one depends on others.
+/// Weights s of the `used` columns that minimize |p − A s|, and p − A s. `None` if a column depends on
+/// others.
 fn least_squares(columns: &[Vec<f64>], used: &[usize], p: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
     // Column k is ∑ upper[k][i] basis[i].
     let mut basis: Vec<Vec<f64>> = Vec::new();
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn a_plane_cone_by_hand() {
-        // Between the x axis and the diagonal.
+        // The cone between the x axis and the diagonal.
         let edge = 0.5f64.sqrt();
         let cone = [vec![1.0, 0.0], vec![edge, edge]];
         let near = |p: [f64; 2], truth: [f64; 2]| {
@@ -135,7 +135,7 @@ mod tests {
             state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
         };
-        // Half of the columns are sums of two others: there are many ways to write a point.
+        // Half of the columns are sums of two others, so a point can be written in many ways.
         for (m, k) in [(3, 5), (20, 10), (20, 40), (60, 200)] {
             let unit = |x: Vec<f64>| -> Vec<f64> { x.iter().map(|v| v / norm(&x)).collect() };
             let mut columns: Vec<Vec<f64>> = (0..k)

@@ -8,15 +8,15 @@
 //! un = n·(v_b + w_b ẑ × r_b) − n·(v_a + w_a ẑ × r_a) = n·v_b + (r_b × n) w_b − n·v_a − (r_a × n) w_a,
 //! ```
 //!
-//! is the row (−n, −r_a × n | n, r_b × n) of J times (v_a | v_b); the tangential row has t for n.
-//! A step looks for impulses λ, one (normal, tangential) pair per contact, and velocities
+//! is the row (−n, −r_a × n | n, r_b × n) of J times (v_a | v_b); the tangential row has t instead of n. A
+//! step seeks impulses λ, one (normal, tangential) pair per contact, and velocities
 //!
 //! ```text
 //! v⁺ = v* + M⁻¹ Jᵀ λ,      v* = v + h M⁻¹ f,
 //! ```
 //!
-//! that obey the contact law of [`crate::lab::reference::residual`]. G = J M⁻¹ Jᵀ is the Delassus matrix. Joints have rows
-//! and laws of their own: [`crate::lab::reference::joints`].
+//! that obey the contact law of [`crate::lab::reference::residual`]. G = J M⁻¹ Jᵀ is the Delassus matrix.
+//! Joints have their own rows and laws: [`crate::lab::reference::joints`].
 
 use super::rows::ProblemJoint;
 pub use crate::engine::constraints::numerics::coulomb_lcp::DPair;
@@ -32,13 +32,13 @@ pub type SideRows = [Velocity; 2];
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProblemBody {
-    /// 1/kg; zero for a body that moves as it likes.
+    /// Inverse mass (1/kg); zero for a body with prescribed motion.
     pub inv_mass: f64,
-    /// 1/(kg·m²), about the center of mass; zero if it does not turn.
+    /// Inverse inertia (1/(kg·m²)) about the center of mass; zero if the body cannot rotate.
     pub inv_inertia: f64,
     /// Velocity at the start of the step.
     pub velocity: Velocity,
-    /// Velocity v* that the step would end with if there were no contacts.
+    /// Velocity v* at the end of the step without contacts.
     pub free_velocity: Velocity,
 }
 
@@ -46,12 +46,11 @@ pub struct ProblemBody {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProblemContact {
-    /// Body a; none if that side is static.
+    /// Body a; `None` if that side is static.
     pub body_a: Option<u32>,
-    /// Body b; none if that side is static.
+    /// Body b; `None` if that side is static.
     pub body_b: Option<u32>,
-    /// Points with the same number belong to one manifold: they are neighbors in the list and
-    /// share bodies and normal.
+    /// Manifold number. Points of a manifold are neighbors in the list and share bodies and normal.
     pub manifold: u32,
     /// Unit normal from a to b.
     pub normal: [f64; 2],
@@ -63,15 +62,15 @@ pub struct ProblemContact {
     pub gap: f64,
     /// Coulomb coefficient (1).
     pub friction: f64,
-    /// Separation speed that restitution demands (m/s), ≥ 0; zero for an inelastic contact.
+    /// Separation speed required by restitution (m/s), ≥ 0; zero for an inelastic contact.
     pub rebound: f64,
-    /// Impulses that a warm-started solver begins with (N·s).
+    /// Initial impulses of a warm-started solver (N·s).
     pub warm_impulse: DPair,
 }
 
 impl ProblemContact {
-    /// A point without gap or rebound between two bodies, of which none is static: `r` from their
-    /// centers of mass to the point (m).
+    /// A point without gap or rebound between two bodies, where `None` stands for a static one. `r` points
+    /// from their centers of mass to the point (m).
     pub fn touching(
         bodies: [Option<u32>; 2],
         manifold: u32,
@@ -107,7 +106,7 @@ impl ProblemContact {
         [self.normal[1], -self.normal[0]]
     }
 
-    /// Each side that is not static: its body and its rows of J.
+    /// The non-static sides, each with its body and its rows of J.
     pub fn sides(&self) -> impl Iterator<Item = (usize, SideRows)> + use<> {
         let (n, t) = (self.normal, self.tangent());
         let side = move |body: Option<u32>, arm: DPair, sign: f64| {
@@ -145,15 +144,15 @@ fn dot(a: &Velocity, b: &Velocity) -> f64 {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ContactProblem {
-    /// Its name, with its origin.
+    /// Name and origin.
     pub name: String,
-    /// Step (s), > 0.
+    /// Step length (s), > 0.
     pub h: f64,
-    /// Bodies that are not static.
+    /// Non-static bodies.
     pub bodies: Vec<ProblemBody>,
-    /// Contact points, those of a manifold together.
+    /// Contact points, grouped by manifold.
     pub contacts: Vec<ProblemContact>,
-    /// Joints, in the order in which they are solved.
+    /// Joints, in the order of solving.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<ProblemJoint>,
 }
@@ -185,8 +184,8 @@ impl ContactProblem {
         self.contacts.iter().map(|c| c.velocity(velocities)).collect()
     }
 
-    /// Jᵀ λ: what contacts and joints give each body (N·s, N·s, N·m·s). Unlike single impulses of a
-    /// hyperstatic pile, this is determined by the velocities.
+    /// Jᵀ λ: the total impulse of contacts and joints on each body (N·s, N·s, N·m·s). Unlike single impulses
+    /// of a hyperstatic pile, it is determined by the velocities.
     pub fn body_impulses(&self, impulses: &[DPair]) -> Vec<Velocity> {
         let mut p = vec![[0.0; 3]; self.bodies.len()];
         for (c, impulse) in self.contacts.iter().zip(impulses) {
@@ -252,7 +251,7 @@ mod tests {
     use super::*;
     use crate::lab::reference::gallery::{box_pyramid, sliding_box};
 
-    /// Two bodies, one contact at an oblique normal; b of 2 kg and 0.5 kg·m², a of 1 kg, 0.25 kg·m².
+    /// Two bodies and one contact with an oblique normal; b has 2 kg and 0.5 kg·m², a 1 kg and 0.25 kg·m².
     fn oblique() -> ContactProblem {
         let body = |inv_mass, inv_inertia, v: Velocity| ProblemBody {
             inv_mass,
@@ -282,7 +281,7 @@ mod tests {
         assert!((a - b).abs() < 1e-14, "{a} is not {b}");
     }
 
-    /// 1/5e-324 is infinite, and made the norms NaN: a reference was accepted that its own check refused.
+    /// 1/5e-324 is infinite and made the norms NaN: a reference was accepted that its own check rejected.
     #[test]
     fn a_mass_beyond_all_numbers_is_infinite() {
         let mut p = oblique();
@@ -293,7 +292,7 @@ mod tests {
         assert_eq!(norm, p.mass_norm(&v));
     }
 
-    /// Names go into tables and terminals.
+    /// Names appear in tables and terminals.
     #[test]
     fn a_name_is_one_line() {
         let mut p = oblique();
@@ -361,7 +360,7 @@ mod tests {
         close(p.mass_norm(&[[1.0, 0.0, 2.0], [0.0, 3.0, -1.0]]), 20.5f64.sqrt());
         assert_eq!(p.loads(), [[0.0, -1.0, 0.0], [0.0, -2.0, 0.0]]);
         assert_eq!((p.total_load(), p.impulse_unit()), (3.0, 2.0));
-        // ‖v* − v‖ = √3; a reference at rest, an answer off by 1 m/s on the 1 kg body.
+        // ‖v* − v‖ = √3; a reference at rest, and a solution with an error of 1 m/s on the 1 kg body.
         let rest = [[0.0; 3]; 2];
         close(p.velocity_error(&[[1.0, 0.0, 0.0], [0.0; 3]], &rest), 1.0 / 3.0f64.sqrt());
         assert_eq!(p.velocity_error(&rest, &rest), 0.0);

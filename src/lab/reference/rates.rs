@@ -1,21 +1,20 @@
 //! Rates of convergence per iteration.
 
-/// Fewest points that a fitted rate may rest on.
+/// Minimum number of points for a fit.
 const FEWEST_POINTS: usize = 4;
 
-/// Asymptotic factor per iteration of a residual history, fitted on its last decade; above 1 if it
-/// diverges.
+/// Asymptotic factor per iteration of a residual history, fitted to its last decade; above 1 if it diverges.
 ///
-/// The last decade is the longest tail whose entries all lie within a factor 10 of the last one;
-/// the rate is the exponential of the least-squares slope of ln r over it. Stop the history above
-/// the rounding floor, or its flat end is what gets fitted. None if the tail is shorter than four
-/// (convergence faster than linear) or the last entry is not a positive number.
+/// The last decade is the longest tail with all entries within a factor 10 of the last one. The rate is the
+/// exponential of the least-squares slope of ln r over it. The history must end above the rounding floor,
+/// otherwise its flat end is fitted. `None` if the tail is shorter than four (convergence faster than linear)
+/// or the last entry is not a positive number.
 pub fn rate(history: &[f64]) -> Option<f64> {
     let points: Vec<[f64; 2]> = history.iter().enumerate().map(|(k, &r)| [k as f64, r]).collect();
     rate_at(&points)
 }
 
-/// As [`rate`], from points (iteration, residual) that need not lie at every iteration.
+/// Like [`rate`], from points (iteration, residual) that may skip iterations.
 pub fn rate_at(history: &[[f64; 2]]) -> Option<f64> {
     let &[_, last] = history.last()?;
     if last.is_nan() || last <= 0.0 || last.is_infinite() {

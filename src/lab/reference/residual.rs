@@ -1,22 +1,22 @@
 //! Residuals of the contact law for velocities and impulses.
 //!
-//! The law at a contact with relative velocity (un, ut), un including the right-hand side b of
-//! the chosen [`Target`], and impulse (λn, λt):
+//! The law at a contact with relative velocity (un, ut), where un includes the right-hand side b of the
+//! chosen [`Target`], and impulse (λn, λt):
 //!
 //! ```text
 //! Signorini   0 ≤ λn ⊥ un ≥ 0
 //! Coulomb     |λt| ≤ µ λn;  λt = −µ λn sign(ut) where ut ≠ 0
 //! ```
 //!
-//! The main measure is the natural map (Alart & Curnier
-//! 1991), zero exactly where the law holds, for every ρ > 0:
+//! The main measure is the natural map (Alart & Curnier 1991). For every ρ > 0, it is zero exactly where the
+//! law holds:
 //!
 //! ```text
 //! r_n = λn − max(0, λn − ρn un)
 //! r_t = λt − clamp(λt − ρt ut, −µ max(0, λn), µ max(0, λn))
 //! ```
 //!
-//! With ρ = 1/G_ii it is an impulse: how much one exact sweep over this row alone would change it.
+//! With ρ = 1/G_ii it is an impulse: the change that one exact sweep over this row alone would make.
 
 use super::joints::BlockLine;
 use super::problem::{ContactProblem, DPair, Velocity};
@@ -31,16 +31,16 @@ pub struct ContactResidual {
     pub normal: f64,
     /// Natural map, tangential part (N·s).
     pub tangent: f64,
-    /// max(0, −un): speed of approach left over (m/s).
+    /// max(0, −un): remaining approach speed (m/s).
     pub approach: f64,
     /// max(0, −λn): pull (N·s).
     pub pull: f64,
-    /// max(0, |λt| − µ max(0, λn)): friction beyond the cone (N·s).
+    /// max(0, |λt| − µ max(0, λn)): friction outside the cone (N·s).
     pub cone: f64,
     /// |λn un|: force at a distance (J).
     pub complementarity: f64,
-    /// |ut| | µ max(0, λn) − |λt| | + max(0, λt ut): sliding off the cone's edge, or friction
-    /// that drives (J).
+    /// |ut| | µ max(0, λn) − |λt| | + max(0, λt ut): sliding with friction off the cone's edge, or friction
+    /// that accelerates (J).
     pub dissipation: f64,
     /// |λ − P_K(λ − ρ ũ)|, ũ = (un + µ|ut|, ut) (N·s), De Saxcé & Feng 1998.
     pub de_saxce: f64,
@@ -48,7 +48,7 @@ pub struct ContactResidual {
 
 /// Residuals of every contact.
 ///
-/// `velocities` need not follow from `impulses`; see [`momentum_defect`] for that.
+/// `velocities` need not follow from `impulses`; [`momentum_defect`] measures this.
 pub fn contact_residuals(
     problem: &ContactProblem,
     target: Target,
@@ -59,7 +59,7 @@ pub fn contact_residuals(
     (0..problem.contacts.len()).map(|i| measure.contact(i, velocities, impulses)).collect()
 }
 
-/// Residual of every row of joints (N·s), in their order; see [`super::joints`].
+/// Residual of every joint row (N·s), in their order; see [`super::joints`].
 ///
 /// `velocities` need not follow from `impulses`.
 pub fn joint_residuals(
@@ -72,7 +72,7 @@ pub fn joint_residuals(
     lines.iter().flat_map(|line| line.residuals(velocities, impulses).into_iter().take(line.size)).collect()
 }
 
-/// A problem under a law, with everything that does not change with impulses.
+/// A problem under a law, with all data that does not depend on impulses.
 pub(super) struct LawMeasure<'a> {
     problem: &'a ContactProblem,
     diagonal: Vec<DPair>,
@@ -126,8 +126,8 @@ pub fn law_residual(mu: f64, [un, ut]: DPair, [ln, lt]: DPair, [rho_n, rho_t]: D
 
 /// Euclidean projection onto the wedge K = {λn ≥ 0, |λt| ≤ µ λn}.
 ///
-/// Inside, it is the identity; in the polar wedge {µ|λt| ≤ −λn}, the apex; else the point of the
-/// nearer edge, whose direction is (1, ±µ)/√(1 + µ²): n' = (λn + µ|λt|)/(1 + µ²).
+/// It is the identity inside K and the apex in the polar wedge {µ|λt| ≤ −λn}. Elsewhere it is the nearest
+/// point on the nearer edge, whose direction is (1, ±µ)/√(1 + µ²): n' = (λn + µ|λt|)/(1 + µ²).
 pub fn project_cone(mu: f64, [ln, lt]: DPair) -> DPair {
     if ln >= 0.0 && lt.abs() <= mu * ln {
         [ln, lt]
@@ -150,7 +150,8 @@ pub(super) fn clamp(x: f64, radius: f64) -> f64 {
     }
 }
 
-/// Largest |natural map| over all contacts and both directions, and all rows of joints (N·s); NaN if anything is.
+/// Largest |natural map| over all contacts, in both directions, and all joint rows (N·s); NaN if any value is
+/// NaN.
 pub fn natural_map(
     problem: &ContactProblem,
     target: Target,
@@ -160,7 +161,8 @@ pub fn natural_map(
     LawMeasure::new(problem, target).natural_map(velocities, impulses)
 }
 
-/// ‖v − v* − M⁻¹ Jᵀ λ‖ in the mass norm (√J·√2): velocities that do not follow from the impulses.
+/// ‖v − v* − M⁻¹ Jᵀ λ‖ in the mass norm (√J·√2): how far the velocities are from those that follow from the
+/// impulses.
 pub fn momentum_defect(problem: &ContactProblem, velocities: &[Velocity], impulses: &[DPair]) -> f64 {
     let follow = problem.velocities(impulses);
     let difference: Vec<Velocity> =
@@ -168,19 +170,19 @@ pub fn momentum_defect(problem: &ContactProblem, velocities: &[Velocity], impuls
     problem.mass_norm(&difference)
 }
 
-/// Distribution of absolute values; all NaN if one of them is.
+/// Distribution of absolute values; all NaN if one value is NaN.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Summary {
-    /// Largest.
+    /// Largest value.
     pub max: f64,
     /// √(mean square).
     pub rms: f64,
-    /// Smallest value that at least 95 % do not exceed.
+    /// Smallest value not exceeded by at least 95 % of the values.
     pub p95: f64,
 }
 
 impl Summary {
-    /// Summary of |values|; zero for none.
+    /// Summary of |values|; zero for an empty list.
     pub fn of(values: &[f64]) -> Self {
         if values.iter().any(|x| x.is_nan()) {
             return Summary { max: f64::NAN, rms: f64::NAN, p95: f64::NAN };
@@ -228,7 +230,7 @@ mod tests {
         for (u, l) in on_the_law {
             for rho in [0.25, 1.0, 8.0] {
                 let r = law_residual(0.5, u, l, [rho, 2.0 * rho]);
-                // Powers of two make every step exact, but for the division by 1 + µ² of P_K.
+                // Powers of two make every operation exact, except the division by 1 + µ² in P_K.
                 assert!(r.de_saxce < 1e-15, "{u:?} {l:?} {r:?}");
                 assert_eq!(ContactResidual { de_saxce: 0.0, ..r }, ContactResidual::default());
             }
@@ -237,7 +239,8 @@ mod tests {
 
     #[test]
     fn convex_relaxation_is_not_the_law() {
-        // Sliding with un = µ|ut| solves the relaxed cone problem; it must not pass for Coulomb.
+        // Sliding with un = µ|ut| solves the relaxed cone problem; it must not count as a solution of
+        // Coulomb's law.
         let r = law_residual(0.5, [1.0, 2.0], [4.0, -2.0], [1.0, 1.0]);
         assert_eq!((r.normal, r.tangent), (1.0, 0.0));
         assert!(r.de_saxce > 0.5);

@@ -5,32 +5,32 @@ use crate::engine::constraints::numerics::matrix::solve_in_place;
 use crate::engine::constraints::records::rows::RowLaw;
 use serde::{Deserialize, Serialize};
 
-/// Rows of the largest block.
+/// Maximum number of rows in a block.
 pub const ROWS: usize = 3;
-/// Numbers of the rows of a block; those of absent rows are zero.
+/// One number per row of a block; zero for absent rows.
 pub type RowVector = [f64; ROWS];
-/// A spring that is damped less than this (1) pushes as its error says, whatever its velocity is.
+/// Damping (1) below which the impulse of a spring follows from its error alone, whatever its velocity.
 pub(super) const UNDAMPED: f64 = 1e-12;
 
 /// A joint of a problem.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProblemJoint {
-    /// Body a; none if that side is static.
+    /// Body a; `None` if that side is static.
     pub body_a: Option<u32>,
-    /// Body b; none if that side is static.
+    /// Body b; `None` if that side is static.
     pub body_b: Option<u32>,
     /// Lengths of the arms from the centers of mass of a and b to the anchors (m).
     pub reach: DPair,
-    /// Its blocks, in the order in which they are solved.
+    /// Its blocks, in the order of solving.
     pub blocks: Vec<ProblemBlock>,
 }
 
-/// Rows of a joint that are solved together.
+/// Joint rows that are solved together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProblemBlock {
-    /// The law of all of them.
+    /// The law of all its rows.
     pub law: BlockLaw,
     /// One to three rows.
     pub rows: Vec<ProblemRow>,
@@ -42,7 +42,7 @@ pub struct ProblemBlock {
 pub enum BlockLaw {
     /// C = 0.
     Rigid,
-    /// C ≥ 0, of one row.
+    /// C ≥ 0, for a single row.
     Limit,
     /// J v = u.
     Motor {
@@ -57,7 +57,7 @@ pub enum BlockLaw {
         stiffness: f64,
         /// D (1)
         damping: f64,
-        /// F h (N·s or N·m·s), if it is bounded.
+        /// F h (N·s or N·m·s); `None` if unbounded.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         cap: Option<f64>,
     },
@@ -78,7 +78,7 @@ impl From<RowLaw<f32>> for BlockLaw {
 }
 
 impl BlockLaw {
-    /// Greatest norm of its impulses, where there is one.
+    /// Largest norm of its impulses; `None` if unbounded.
     pub fn cap(&self) -> Option<f64> {
         match *self {
             BlockLaw::Motor { cap, .. } => Some(cap),
@@ -96,16 +96,16 @@ pub struct ProblemRow {
     pub axis: [f64; 2],
     /// s_a: r_a × d (m), or 1 for an angle.
     pub arm_a: f64,
-    /// s_b: the same of b.
+    /// s_b: the same for b.
     pub arm_b: f64,
     /// C at the start of the step (m or rad).
     pub error: f64,
-    /// Impulse that a warm-started solver begins with (N·s or N·m·s).
+    /// Initial impulse of a warm-started solver (N·s or N·m·s).
     pub warm_impulse: f64,
 }
 
 impl ProblemRow {
-    /// Whether it is a row of an angle.
+    /// Whether the row constrains an angle.
     pub fn is_angular(&self) -> bool {
         self.axis == [0.0; 2]
     }
@@ -117,7 +117,7 @@ impl ProblemJoint {
         self.blocks.iter().flat_map(|block| &block.rows)
     }
 
-    /// A revolute joint whose anchors meet: `r` from the centers of mass to the point (m).
+    /// A revolute joint with coinciding anchors: `r` from the centers of mass to the point (m).
     pub fn revolute(bodies: [Option<u32>; 2], r: [[f64; 2]; 2]) -> Self {
         let arm = |k: usize, d: [f64; 2]| bodies[k].map_or(0.0, |_| r[k][0] * d[1] - r[k][1] * d[0]);
         let row = |axis| ProblemRow {
@@ -140,12 +140,12 @@ pub(super) enum BlockBound {
     None,
     /// λ ≥ 0
     Positive,
-    /// Greatest norm.
+    /// Largest norm.
     Cap(f64),
 }
 
 impl BlockBound {
-    /// Whether impulses are off the bound, so that they answer to velocities.
+    /// Whether impulses are inside the bound, so that they depend on velocities.
     pub fn is_inside(self, y: RowVector) -> bool {
         match self {
             BlockBound::None => true,
@@ -173,13 +173,13 @@ impl BlockBound {
 /// The law of a block as a line in the velocity; see [`super::joints`].
 #[derive(Clone, Debug)]
 pub struct LawLine {
-    /// Rows.
+    /// Number of rows.
     pub size: usize,
     /// K
     pub(super) response: [RowVector; ROWS],
     /// K⁻¹
     inverse: [RowVector; ROWS],
-    /// P of [`Self::solution`], K⁻¹ at first.
+    /// P of [`Self::solution`], initially K⁻¹.
     pub(super) step: [RowVector; ROWS],
     /// α = q
     pub(super) alpha: f64,
@@ -188,8 +188,8 @@ pub struct LawLine {
 }
 
 impl LawLine {
-    /// The line of `law` for `size` rows with these errors, in a block of response K. `own`: right-hand sides of rigid rows and
-    /// limits.
+    /// The line of `law` for `size` rows with these errors, in a block with the response K. `own`: right-hand
+    /// sides of rigid rows and limits.
     pub fn new(
         law: BlockLaw,
         size: usize,
@@ -224,8 +224,8 @@ impl LawLine {
         product(&self.inverse, x)
     }
 
-    /// Π(y), y = λ − P (c + q J v + (1 − α) K λ): the impulses that satisfy the block alone, at the velocity J v = `u`
-    /// with impulses `l`.
+    /// Π(y), y = λ − P (c + q J v + (1 − α) K λ): the impulses that satisfy the block alone, at the velocity
+    /// J v = `u` with impulses `l`.
     pub fn solution(&self, u: RowVector, l: RowVector) -> RowVector {
         let soft = product(&self.response, l);
         let f = [0, 1, 2].map(|i| self.offset[i] + self.alpha * u[i] + (1.0 - self.alpha) * soft[i]);
@@ -249,13 +249,13 @@ impl LawLine {
     }
 }
 
-/// Normal law of a solver at one contact: un = Jn v + bias + compliance λn. Of a rigid row or a limit of a joint:
-/// J v + bias + compliance K λ; motors and springs have the law of the joint.
+/// Normal law of a solver at one contact: un = Jn v + bias + compliance λn. For a rigid row or a limit of a
+/// joint: J v + bias + compliance K λ. Motors and springs have the law of the joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OwnRow {
-    /// m/s; negative pushes apart.
+    /// Bias (m/s); negative values push apart.
     pub bias: f64,
-    /// 1/kg, ≥ 0: velocity that the contact yields per impulse; of a row of a joint in its K (1).
+    /// Velocity that the contact yields per impulse (1/kg), ≥ 0. For a joint row, as a multiple of its K (1).
     pub compliance: f64,
 }
 
@@ -269,12 +269,13 @@ impl ProblemRow {
     }
 }
 
-/// What an impulse of a row counts in N·s, by the sum of both inverse masses (1/kg): 1, or √(K m) of an angle (1/m).
+/// Factor from an impulse of a row to N·s: 1, or √(K m) for an angle (1/m). `inv_mass` is the sum of both
+/// inverse masses (1/kg).
 pub fn row_scale(is_angular: bool, response: f64, inv_mass: f64) -> f64 {
     if is_angular && inv_mass > 0.0 { (response / inv_mass).sqrt() } else { 1.0 }
 }
 
-/// The inverse of K, the diagonal of which is scaled to 1 first; none if it has none to 9 digits.
+/// The inverse of K, computed with the diagonal scaled to 1. `None` if K is singular to 9 digits.
 pub(super) fn inverted(k: [RowVector; ROWS], size: usize) -> Option<[RowVector; ROWS]> {
     let mut inverse = [[0.0; ROWS]; ROWS];
     let scale = [0, 1, 2].map(|i| if i < size { 1.0 / k[i][i].sqrt() } else { 1.0 });
@@ -301,7 +302,7 @@ fn product(matrix: &[RowVector; ROWS], x: RowVector) -> RowVector {
     matrix.map(|row| row[0] * x[0] + row[1] * x[1] + row[2] * x[2])
 }
 
-/// max(x, 0) that hands NaN on, so that a blown-up solver cannot look exact.
+/// max(x, 0) that propagates NaN, so that a diverged solver cannot look exact.
 pub(super) fn positive(x: f64) -> f64 {
     if x <= 0.0 { 0.0 } else { x }
 }

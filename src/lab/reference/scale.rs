@@ -1,10 +1,10 @@
-//! Loads of a contact problem, and the norms in which its errors are measured.
+//! Loads of a contact problem, and norms for its errors.
 
 use super::problem::{ContactProblem, ProblemBody, Velocity};
 
 impl ContactProblem {
-    /// M (v* − v): what forces give each body during the step (N·s, N·s, N·m·s); zero for
-    /// components of infinite mass.
+    /// M (v* − v): the impulse of forces on each body during the step (N·s, N·s, N·m·s). Zero for components
+    /// of infinite mass.
     pub fn loads(&self) -> Vec<Velocity> {
         let change = |b: &ProblemBody| {
             let m = masses(b);
@@ -18,8 +18,8 @@ impl ContactProblem {
         self.loads().iter().map(|p| p[0].hypot(p[1])).sum()
     }
 
-    /// The impulse by which residuals are made dimensionless (N·s): h m g of the heaviest body,
-    /// max |m (v* − v)|; without forces max |m v*|; 1 if nothing moves.
+    /// The impulse by which residuals are divided (N·s): h m g of the heaviest body, max |m (v* − v)|.
+    /// Without forces max |m v*|; 1 if nothing moves.
     pub fn impulse_unit(&self) -> f64 {
         let largest = |p: Vec<Velocity>| p.iter().map(|p| p[0].hypot(p[1])).fold(0.0, f64::max);
         let momenta = self.bodies.iter().map(|b| {
@@ -38,8 +38,8 @@ impl ContactProblem {
         self.bodies.iter().zip(velocities).map(square).sum::<f64>().sqrt()
     }
 
-    /// ‖v − w‖ in the mass norm, relative to max(‖w‖, ‖v* − v_start‖): the second stands in for
-    /// √m g h, so that a reference at rest does not make every error infinite.
+    /// ‖v − w‖ in the mass norm, relative to max(‖w‖, ‖v* − v_start‖). The second norm represents √m g h, so
+    /// that a reference at rest does not make every error infinite.
     pub fn velocity_error(&self, velocities: &[Velocity], reference: &[Velocity]) -> f64 {
         let minus = |a: &[Velocity], b: &[Velocity]| -> Vec<Velocity> {
             a.iter().zip(b).map(|(a, b)| [0, 1, 2].map(|k| a[k] - b[k])).collect()
@@ -52,7 +52,7 @@ impl ContactProblem {
     }
 }
 
-/// Finite masses of a body, zero where infinite: those components cannot change.
+/// Finite masses of a body; zero for infinite ones, whose components cannot change.
 fn masses(b: &ProblemBody) -> Velocity {
     // The reciprocal of the smallest numbers is infinite, too.
     let inverse = |x: f64| if x > 0.0 && x.recip().is_finite() { x.recip() } else { 0.0 };

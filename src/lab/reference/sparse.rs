@@ -1,33 +1,33 @@
-//! Sparse systems of equations, by LU factorization.
+//! Sparse linear systems, by LU factorization.
 //!
-//! Columns are eliminated in an order of approximate minimum degree of A + Aᵀ, which suits matrices
-//! whose pattern is nearly symmetric, and a diagonal entry stays the pivot of its column while it is
-//! `DIAGONAL` times the largest: that keeps the order and so the fill. What this loses in accuracy,
-//! a step of refinement returns, its remainder summed to twice the working precision.
+//! Columns are eliminated in an approximate minimum degree order of A + Aᵀ, which suits matrices with a
+//! nearly symmetric pattern. A diagonal entry stays the pivot of its column if it is at least `DIAGONAL`
+//! times the largest entry, which preserves the order and so limits the fill. One step of refinement recovers
+//! the lost accuracy, with its remainder summed to twice the working precision.
 //!
-//! **Source**: Davis 2006 (`davis2006`), §6.2 (left-looking LU) and §7.1
-//! (ordering), in the Rust of the crate `rsparse`.
+//! **Source**: Davis 2006 (`davis2006`), §6.2 (left-looking LU) and §7.1 (ordering), as implemented in Rust
+//! by the crate `rsparse`.
 
 use rsparse::data::Sprs;
 
-/// Fraction of the largest entry of a column at which its diagonal entry is the pivot; growth of
-/// rounding errors per elimination is at most 1 + 1/fraction.
+/// Smallest ratio of a column's diagonal entry to its largest one at which the diagonal entry is the pivot.
+/// Rounding errors grow by at most 1 + 1/fraction per elimination.
 const DIAGONAL: f64 = 0.1;
 
 /// An entry of a matrix: column, row, value.
 pub type Triplet = (usize, usize, f64);
 
-/// x of A x = `right`, where entries of A at the same place add up; none if A is singular to working
-/// precision. All rows and columns must be less than the length of `right`.
+/// x of A x = `right`. Entries of A at the same position are summed. `None` if A is singular to working
+/// precision. All row and column indices must be less than the length of `right`.
 pub fn solve(entries: Vec<Triplet>, right: &[f64]) -> Option<Vec<f64>> {
     let n = right.len();
     let matrix = compressed(entries, n);
-    // The library's ordering (0: of A + Aᵀ; −1: none) needs at least two columns.
+    // Ordering of the library: 0 for A + Aᵀ, which needs at least two columns; −1 for none.
     let mut symbolic = rsparse::sqr(&matrix, if n < 2 { -1 } else { 0 }, false);
     let factors = rsparse::lu(&matrix, &mut symbolic, DIAGONAL).ok()?;
     let place = factors.pinv.as_ref()?;
     let solve = |right: &[f64]| {
-        // L U Qᵀ x = P r; row i of A is row `place[i]` of L U, column k of it is column q_k of A.
+        // L U Qᵀ x = P r; row i of A is row `place[i]` of L U, column k of L U is column q_k of A.
         let mut permuted = vec![0.0; n];
         place.iter().zip(right).for_each(|(&k, &r)| permuted[k as usize] = r);
         rsparse::lsolve(&factors.l, &mut permuted);
@@ -43,8 +43,8 @@ pub fn solve(entries: Vec<Triplet>, right: &[f64]) -> Option<Vec<f64>> {
     x.iter().all(|x| x.is_finite()).then_some(x)
 }
 
-/// right − A x to twice the working precision: beside every sum stands what its roundings lost, those
-/// of products found by a fused multiplication (Ogita, Rump and Oishi 2005, `ogita2005`).
+/// right − A x to twice the working precision: every sum is stored with its accumulated rounding error. The
+/// errors of products are computed by fused multiply-adds (Ogita, Rump and Oishi 2005, `ogita2005`).
 fn remainder(matrix: &Sprs<f64>, x: &[f64], right: &[f64]) -> Vec<f64> {
     let mut sums: Vec<(f64, f64)> = right.iter().map(|&r| (r, 0.0)).collect();
     for (column, range) in matrix.p.windows(2).enumerate() {
@@ -60,7 +60,7 @@ fn remainder(matrix: &Sprs<f64>, x: &[f64], right: &[f64]) -> Vec<f64> {
     sums.into_iter().map(|(sum, lost)| sum + lost).collect()
 }
 
-/// Compressed columns of a square matrix, rows ascending.
+/// Compressed columns of a square matrix, with ascending rows.
 fn compressed(mut entries: Vec<Triplet>, n: usize) -> Sprs<f64> {
     entries.sort_by_key(|&(column, row, _)| (column, row));
     entries.dedup_by(|next, kept| {
@@ -75,7 +75,7 @@ fn compressed(mut entries: Vec<Triplet>, n: usize) -> Sprs<f64> {
         matrix.p[column + 1] = k as isize + 1;
         (matrix.i[k], matrix.x[k]) = (row, value);
     }
-    // An empty column begins where the one before it ends.
+    // An empty column starts where the previous one ends.
     for column in 0..n {
         matrix.p[column + 1] = matrix.p[column + 1].max(matrix.p[column]);
     }
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn a_grid_with_a_drift_is_solved_to_rounding() {
-        // 5-point Laplacian of a 30 × 30 grid, unsymmetric, and weak diagonals that must be passed over.
+        // Unsymmetric 5-point Laplacian of a 30 × 30 grid, with weak diagonals that must not become pivots.
         let side = 30usize;
         let n = side * side;
         let mut entries = Vec::new();

@@ -1,44 +1,44 @@
-//! Statics: whether rest is possible, and how much load may be added before it is not.
+//! Statics: whether rest is possible, and the largest additional load that still allows it.
 //!
-//! Rest under loads f (N·s over a step, or N) is possible exactly if impulses within their friction
-//! cones balance them: Jᵀ λ + f = 0, λn ≥ 0, |λt| ≤ µ λn. So the answer needs no time step and no
-//! iteration of contact laws. If rest is impossible every correct solver must show motion; if it is
-//! possible, rest is *a* solution, with friction not always the only one.
+//! Rest under loads f (N·s over a step, or N) is possible exactly if impulses within their friction cones
+//! balance them: Jᵀ λ + f = 0, λn ≥ 0, |λt| ≤ µ λn. The answer needs no time step and no iteration of contact
+//! laws. If rest is impossible, every correct solver must show motion. If it is possible, rest is *a*
+//! solution; with friction it is not always the only one.
 //!
-//! The cone of a contact is spanned by its edges n ± µ t, and the loads that the contacts can give are
-//! the cone K of all edges together. Rest is possible exactly if −f lies in K, which the point of K
-//! nearest to −f decides ([`super::nnls`]). If it does not, what remains, r, is a velocity of the
-//! bodies at which f works and no contact can: the mechanism of collapse.
+//! The cone of a contact is spanned by its edges n ± µ t, and the possible loads of the contacts form the
+//! cone K of all edges together. Rest is possible exactly if −f lies in K. The point of K nearest to −f
+//! decides this ([`super::nnls`]). If −f is outside, the remainder r is a velocity of the bodies at which f
+//! does work and no contact can: the collapse mechanism.
 //!
-//! **How much load.** Every r that makes no acute angle with an edge allows rest under b + α d only
-//! while r·(b + α d) ≥ 0. So begin with the r of d alone, and while rest is impossible at the α that
-//! this inequality allows, go on with the r found there. α falls to the largest possible one in as
-//! many steps as there are mechanisms on the way, each of which cuts off all α beyond a face of K.
+//! **How much load.** Every r that forms no acute angle with an edge allows rest under b + α d only while
+//! r·(b + α d) ≥ 0. The method starts with the r of d alone. While rest is impossible at the α that this
+//! inequality allows, it continues with the r found there. α falls to the largest possible value in as many
+//! steps as there are mechanisms on the way. Each mechanism excludes all α beyond a face of K.
 //!
-//! Moments are divided by the longest arm and loads by their length, so that tolerances have a meaning.
+//! Moments are divided by the longest arm and loads by their length, so that tolerances are meaningful.
 //!
-//! **Source**: the static and the kinematic theorem of limit analysis, in Livesley 1978
-//! (`livesley1978`), there as a linear program and its dual.
+//! **Source**: the static and the kinematic theorem of limit analysis, in Livesley 1978 (`livesley1978`),
+//! there as a linear program and its dual.
 
 use super::nnls::{dot, norm, remainder};
 use super::problem::{ContactProblem, Velocity};
 use crate::lab::error::Error;
 
-/// Remainder, relative to the load, up to which it counts as balanced.
+/// Largest remainder, relative to the load, that counts as balanced.
 const BALANCED: f64 = 1e-10;
-/// Rounds of least squares allowed per edge; typical runs need less than one.
+/// Maximum number of least-squares rounds per edge; typical runs need less than one.
 const ROUNDS_PER_EDGE: usize = 20;
-/// Mechanisms allowed on the way to a collapse load; typical runs meet two to ten.
+/// Maximum number of mechanisms on the way to a collapse load; typical runs meet two to ten.
 const MECHANISMS: usize = 1000;
 
-/// Largest growth of a disturbance.
+/// Largest multiple of a disturbance that allows rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Collapse {
-    /// Even without it there is no rest.
+    /// Rest is impossible even without the disturbance.
     NoRest,
     /// Rest is possible up to this multiple of the disturbance.
     At(f64),
-    /// The contacts bear any multiple.
+    /// The contacts can bear any multiple.
     Never,
 }
 
@@ -61,8 +61,8 @@ pub fn collapse(
     if cone.mechanism(&loads)?.is_some() {
         return Ok(Collapse::NoRest);
     }
-    // What can be balanced can be balanced any number of times; and if every α can be, so can the limit
-    // of (loads + α disturbance)/α.
+    // A load that can be balanced can be balanced at any multiple. If every α can be balanced, so can the
+    // limit of (loads + α disturbance)/α.
     let Some(mut mechanism) = cone.mechanism(&disturbance)? else { return Ok(Collapse::Never) };
     for _ in 0..MECHANISMS {
         // The disturbance drives the mechanism (r·d < 0), the loads resist it (r·b ≥ 0).
@@ -79,9 +79,9 @@ pub fn collapse(
 /// Forces that contacts can exert on the bodies.
 struct Cone<'a> {
     problem: &'a ContactProblem,
-    /// Components that must balance, (body, 0..3): those of infinite mass are held by themselves.
+    /// Components that must balance, (body, 0..3). Components of infinite mass need no balance.
     rows: Vec<(usize, usize)>,
-    /// By which moments are divided (m).
+    /// Length by which moments are divided (m).
     arm: f64,
     /// Edges of length 1.
     edges: Vec<Vec<f64>>,
@@ -107,7 +107,8 @@ impl<'a> Cone<'a> {
                     loads[body] = [0, 1, 2].map(|k| n[k] + slope * t[k]);
                 }
                 let edge = cone.in_rows(&loads);
-                // A side that answers to some impulses may be pressed against this one.
+                // A body may respond to impulses in general, but not along this edge, which then has
+                // length 0.
                 let length = norm(&edge);
                 if length > 0.0 {
                     cone.edges.push(edge.into_iter().map(|x| x / length).collect());
@@ -122,7 +123,7 @@ impl<'a> Cone<'a> {
         self.rows.iter().map(|&(body, k)| loads[body][k] / unit[k]).collect()
     }
 
-    /// Loads in the rows of this cone, if they are loads of the problem.
+    /// Loads in the rows of this cone. Errors: a wrong number of entries, or values that are not finite.
     fn column(&self, name: &str, loads: &[Velocity]) -> Result<Vec<f64>, Error> {
         if loads.len() != self.problem.bodies.len() {
             let message = format!("{} entries for {} bodies", loads.len(), self.problem.bodies.len());
@@ -134,7 +135,7 @@ impl<'a> Cone<'a> {
         Ok(self.in_rows(loads))
     }
 
-    /// The mechanism by which contacts give way under `load`, of any length; none if they bear it.
+    /// The mechanism by which contacts give way under `load`, of any length; `None` if they bear the load.
     fn mechanism(&self, load: &[f64]) -> Result<Option<Vec<f64>>, Error> {
         let length = norm(load);
         if length == 0.0 {
@@ -184,7 +185,7 @@ mod tests {
         assert!(!rests(&plank(&[0.5, 1.0], 0.5)));
         assert!(rests(&box_pyramid(5, 0.0)));
         assert!(rests(&wedge(0.25, 0.0)));
-        // A wedge under tension pulls out unless µ > tan φ: reverse gravity.
+        // Under reversed gravity a wedge pulls out unless µ > tan φ.
         let up = |p: &ContactProblem| -> Vec<Velocity> { p.loads().iter().map(|l| l.map(|x| -x)).collect() };
         for (factor, truth) in [(1.0 + 1e-6, true), (1.0 - 1e-6, false)] {
             let p = wedge(0.25, factor * 0.25f64.tan());
@@ -202,7 +203,7 @@ mod tests {
 
     #[test]
     fn collapse_loads_by_hand() {
-        // A box pushed sideways at its center slides at µ m g (µ < 1) and topples at m g beyond.
+        // A box pushed sideways at its center slides at µ m g (µ < 1) and topples at m g for larger µ.
         let p = block_on_incline(0.0, 0.3);
         let weight = GRAVITY * p.h;
         let push = |x: f64, y: f64| vec![[x * weight, y * weight, 0.0]];
@@ -219,8 +220,8 @@ mod tests {
         assert!(collapse(&p, &p.loads(), &[], 0.0).is_err());
     }
 
-    /// Two cards of 1 kg and length 1 leaning against each other at `angle` from the vertical, on a
-    /// ground of friction `base`, with a load of `extra` kg on each at the top.
+    /// Two cards of 1 kg and length 1 that lean against each other at `angle` from the vertical, on ground
+    /// with friction `base`, with a load of `extra` kg on the top of each.
     fn a_frame(angle: f64, base: f64, extra: f64) -> (ContactProblem, Vec<Velocity>) {
         let (sin, cos) = angle.sin_cos();
         let body =
@@ -228,7 +229,7 @@ mod tests {
         let contact = |a, b, normal, ra, rb, friction, manifold| {
             ProblemContact::touching([a, b], manifold, normal, [ra, rb], friction)
         };
-        // Centers at ∓sin/2; feet outwards below, tops meeting at x = 0.
+        // Centers at ∓sin/2; feet outward below, tops touching at x = 0.
         let (left_foot, left_top) = ([-0.5 * sin, -0.5 * cos], [0.5 * sin, 0.5 * cos]);
         let (right_foot, right_top) = ([0.5 * sin, -0.5 * cos], [-0.5 * sin, 0.5 * cos]);
         let contacts = vec![
@@ -250,8 +251,8 @@ mod tests {
 
     #[test]
     fn cards_need_half_the_tangent_at_their_feet() {
-        // Moments about the top of one card: N sin − T cos − (W/2) sin = 0 with N = W + P, the load P
-        // at the top having no arm: T/N = tan φ (W/2 + P)/(W + P).
+        // Moments about the top of one card: N sin − T cos − (W/2) sin = 0 with N = W + P. The load P at the
+        // top has no arm, so T/N = tan φ (W/2 + P)/(W + P).
         let angle = 25f64.to_radians();
         for extra in [0.0, 1.0, 10.0] {
             let needed = angle.tan() * (0.5 + extra) / (1.0 + extra);

@@ -2,21 +2,22 @@
 //!
 //! **Source**: Stewart & Trinkle 1996; Anitescu & Potra 1997.
 //!
-//! The matrices are those of [`crate::engine::constraints::numerics::coulomb_lcp`], with the compliance of a target on
-//! the diagonal.
+//! The matrices are those of [`crate::engine::constraints::numerics::coulomb_lcp`], with the compliance of a
+//! target on the diagonal.
 //!
-//! **Joints.** Rows without bounds are free: J v + b + R λ = 0, whatever λ is. They are eliminated first, by LDLᵀ in their
-//! order; what is left of G is its Schur complement,
+//! **Joints.** Rows without bounds are free: J v + b + R λ = 0 for any λ. They are eliminated first, by LDLᵀ
+//! in their order. The rest of G is its Schur complement,
 //!
 //! ```text
 //! G ← G_cc − G_cf (G_ff + R)⁻¹ G_fc      b ← b_c − G_cf (G_ff + R)⁻¹ b_f
 //! ```
 //!
-//! and a row that follows from those before it has no pivot and no impulse. Limits are then points without friction, rows
-//! with a cap tangential rows with a bound of their own. Blocks of several rows with a cap are free here: if their impulses
-//! end beyond the cap, the method has no answer.
+//! A row that follows from the previous ones has no pivot and no impulse. Limits are then points without
+//! friction, and rows with a cap are tangential rows with a bound of their own. Blocks of several rows with a
+//! cap are treated as free. If their impulses exceed the cap, the method has no answer.
 //!
-//! **Cost**: O(n²) per pivot with n ≤ 4 rows per contact; meant for up to about 150 contacts. O(n³) for n rows of joints.
+//! **Cost**: O(n²) per pivot with n ≤ 4 rows per contact, and O(n³) for n joint rows. Meant for up to about
+//! 150 contacts.
 
 use super::problem::{ContactProblem, DPair, Velocity};
 use super::residual::{Target, natural_map};
@@ -25,20 +26,20 @@ use crate::engine::constraints::numerics::coulomb_lcp::CoulombLcp;
 use crate::engine::constraints::numerics::lemke::LemkeOutcome;
 use crate::engine::constraints::numerics::matrix::Matrix;
 
-/// Pivots allowed per row of the LCP; typical runs need one or two.
+/// Maximum number of pivots per row of the LCP; typical runs need one or two.
 const PIVOTS_PER_ROW: usize = 50;
-/// Covering vectors that are tried until one path ends at an exact solution.
+/// Maximum number of covering vectors tried until one path ends at an exact solution.
 const PATHS: usize = 6;
 /// Relative natural-map residual that counts as exact.
 const EXACT: f64 = 1e-13;
-/// A row of which less than this is left after elimination follows from those before it (1).
+/// Fraction of a row's diagonal after elimination below which the row follows from the previous ones (1).
 const REDUNDANT: f64 = 1e-11;
 
-/// Impulses of a solution, or why there is none. `target` may be compliant.
+/// Impulses of a solution, or the reason why there is none. `target` may be compliant.
 ///
-/// On ill-conditioned problems (jammed piles whose G has eigenvalues down to 10⁻⁶) rounding can end
-/// one of Lemke's paths on a spurious ray or at an inaccurate basis; then other covering vectors are
-/// tried and the answer with the least residual returned.
+/// On ill-conditioned problems (jammed piles whose G has eigenvalues down to 10⁻⁶), rounding can end one of
+/// Lemke's paths on a spurious ray or at an inaccurate basis. Other covering vectors are then tried, and the
+/// answer with the smallest residual is returned.
 pub fn stewart_trinkle(problem: &ContactProblem, target: Target) -> Result<Vec<DPair>, LemkeOutcome> {
     if !problem.joints.is_empty() {
         let eliminated = Eliminated::new(problem, target);
@@ -56,7 +57,8 @@ pub fn stewart_trinkle(problem: &ContactProblem, target: Target) -> Result<Vec<D
     by_lemke(problem, target, &lcp, Some)
 }
 
-/// The best answer of several paths; `whole` makes impulses of the problem from those of the LCP, or refuses them.
+/// The best answer of several paths. `whole` converts impulses of the LCP to those of the problem, or rejects
+/// them.
 fn by_lemke(
     problem: &ContactProblem,
     target: Target,
@@ -83,22 +85,23 @@ fn by_lemke(
     best.map(|(_, impulses)| impulses)
 }
 
-/// A problem with joints, its free rows eliminated.
+/// A problem with joints, with its free rows eliminated.
 struct Eliminated<'a> {
     problem: &'a ContactProblem,
-    /// G + R, and b as its last column; rows of `pivots` as they were when they were eliminated. A contact has two rows, a row
-    /// of a joint one.
+    /// G + R, with b as its last column. Rows of `pivots` keep their values at elimination. A contact has two
+    /// rows, a joint row one.
     cells: Matrix,
     /// Diagonal before the elimination.
     diagonal: Vec<f64>,
-    /// Impulses that do not depend on velocities: of springs without damping, and of redundant rows. `[rows of joints]`
+    /// Impulses that do not depend on velocities: those of springs without damping, and of redundant rows.
+    /// `[rows of joints]`
     fixed: Vec<Option<f64>>,
-    /// Rows that were eliminated, in order.
+    /// Eliminated rows, in order.
     pivots: Vec<usize>,
-    /// Rows of limits, and rows with a cap.
+    /// Rows of limits, then rows with a cap.
     limits: Vec<usize>,
     caps: Vec<(usize, f64)>,
-    /// First row, rows and cap of blocks that are free up to it.
+    /// First row, number of rows and cap of blocks that are treated as free.
     balls: Vec<(usize, usize, f64)>,
 }
 
@@ -107,7 +110,7 @@ impl<'a> Eliminated<'a> {
         let contacts = 2 * problem.contacts.len();
         let lines = problem.lines(target);
         let n = contacts + problem.joint_rows();
-        // Bodies of every row, with its part of J.
+        // The bodies of every row, with their part of J.
         let mut sides: Vec<Vec<(usize, Velocity)>> = Vec::with_capacity(n);
         for c in &problem.contacts {
             for direction in 0..2 {
@@ -194,7 +197,7 @@ impl<'a> Eliminated<'a> {
 
     fn lcp(&self) -> Result<CoulombLcp, LemkeOutcome> {
         let (n, contacts) = (self.diagonal.len(), self.problem.contacts.len());
-        // Points, two rows each, of which a limit has one; then rows with a cap.
+        // Two rows per point, of which a limit has only one; then rows with a cap.
         let pair = |row: usize| [Some(row), None];
         let points = (0..contacts).flat_map(|i| [Some(2 * i), Some(2 * i + 1)]);
         let rows: Vec<Option<usize>> = points
@@ -220,7 +223,7 @@ impl<'a> Eliminated<'a> {
         }))
     }
 
-    /// Impulses of the problem from those of the LCP; none if a block exceeds its cap.
+    /// Impulses of the problem from those of the LCP; `None` if a block exceeds its cap.
     fn impulses(&self, pairs: Vec<DPair>) -> Option<Vec<DPair>> {
         let (contacts, n) = (self.problem.contacts.len(), self.diagonal.len());
         let mut of_rows = vec![0.0; n];
@@ -230,11 +233,11 @@ impl<'a> Eliminated<'a> {
         }
         let capped = pairs[contacts + self.limits.len()..].as_flattened();
         self.caps.iter().zip(capped).for_each(|(&(row, _), &l)| of_rows[row] = l);
-        // Each pivot row knows of those that were not eliminated before it.
+        // Each pivot row depends on the rows that were not eliminated before it.
         let mut is_known = vec![true; n];
         self.pivots.iter().for_each(|&row| is_known[row] = false);
         for (i, l) in self.fixed.iter().enumerate() {
-            // Springs are part of the velocities already.
+            // Fixed impulses of springs are already included in the velocities.
             is_known[2 * contacts + i] &= l.is_none();
         }
         for &row in self.pivots.iter().rev() {
@@ -257,7 +260,7 @@ impl<'a> Eliminated<'a> {
     }
 }
 
-/// All ones, then ones shifted by up to one half by multiples of the golden ratio.
+/// All ones, then ones reduced by up to one half by multiples of the golden ratio.
 fn covering_vector(n: usize, path: usize) -> Vec<f64> {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     (1..=n).map(|i| if path == 0 { 1.0 } else { 0.5 + 0.5 * (GOLDEN * (i * path) as f64).fract() }).collect()
@@ -336,7 +339,7 @@ mod tests {
         }
         let p = heavy_on_light(1e4);
         let l = solve(&p);
-        // The scaled G has condition number 4 R = 4e4, which rounding (1e-16) is multiplied by.
+        // The scaled G has the condition number 4 R = 4e4, which multiplies rounding (1e-16).
         for (i, mass) in [(0, 10001.0), (1, 10000.0)] {
             let truth = mass * GRAVITY * p.h;
             assert!((l[i][0] - truth).abs() < 1e-11 * truth, "{} is not {truth}", l[i][0]);
@@ -381,7 +384,7 @@ mod tests {
 
     #[test]
     fn gaps_close_overlaps_stay_and_rebounds_rebound() {
-        // Disc falling at 2 m/s; h = 1/240 s.
+        // A disc falls at 2 m/s; h = 1/240 s.
         let disc = |gap: f64, rebound: f64| {
             let mut p = disc_column(1);
             p.bodies[0].free_velocity[1] = -2.0;

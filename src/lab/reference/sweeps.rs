@@ -1,32 +1,32 @@
 //! Sweeps over the rows: projected Gauss–Seidel, Jacobi, and Jacobi with mass splitting.
 //!
-//! Every method here changes one row at a time by the impulse that would satisfy it alone,
+//! Every method here changes one row at a time, by the impulse that would satisfy it alone,
 //!
 //! ```text
 //! λn' = max(0, λn − un/G_nn),    λt' = clamp(λt − ut/G_tt, −µ λn', µ λn'),
 //! ```
 //!
-//! so its fixed points are the zeros of the natural map. Gauss–Seidel (Catto 2005; NSGS of
-//! Jean & Moreau 1992) applies each change at once. Jacobi applies all changes of a sweep together
-//! and diverges where λ_max(D⁻¹G) > 2. Mass splitting (Tonge et al. 2012) gives each of the k rows
-//! of a body a copy of 1/k of its mass and averages the copies afterward; a row then sees k times
-//! the inverse mass, and averaging divides the effect of its impulse by k again. So it is Jacobi
-//! with D_i = ∑_sides k J_i M⁻¹ J_iᵀ, and since (∑ᵢ xᵢ)² ≤ k ∑ xᵢ² on every body, D ≥ G: it
-//! converges.
+//! so its fixed points are the zeros of the natural map. Gauss–Seidel (Catto 2005; NSGS of Jean &
+//! Moreau 1992) applies each change at once. Jacobi applies all changes of a sweep together and diverges
+//! where λ_max(D⁻¹G) > 2. Mass splitting (Tonge et al. 2012) gives each of the k rows of a body a copy with
+//! 1/k of its mass and averages the copies afterward. A row then sees k times the inverse mass, and averaging
+//! divides the effect of its impulse by k again. This is Jacobi with D_i = ∑_sides k J_i M⁻¹ J_iᵀ. Since (∑ᵢ
+//! xᵢ)² ≤ k ∑ xᵢ² on every body, D ≥ G, so it converges.
 //!
-//! Joints are solved block by block, before the contacts as in the simulation, each by the impulses that satisfy it alone.
+//! Joints are solved block by block, before the contacts as in the simulation. Each block gets the impulses
+//! that satisfy it alone.
 
 use super::joints::BlockLine;
 use super::problem::{ContactProblem, DPair, Velocity};
 use super::residual::{LawMeasure, OwnRow, Target, clamp};
 use super::rows::positive;
 
-/// When an iteration ends.
+/// Termination criteria of an iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop {
     /// Relative natural-map residual to reach (1), see [`ContactProblem::impulse_unit`].
     pub tolerance: f64,
-    /// Most iterations.
+    /// Maximum number of iterations.
     pub iterations: usize,
 }
 
@@ -35,20 +35,20 @@ pub struct Stop {
 pub enum Status {
     /// The residual reached its tolerance.
     Converged,
-    /// Iterations ran out.
+    /// The maximum number of iterations was reached.
     Limit,
-    /// The residual left all bounds (10⁶ times its start, or not a number).
+    /// The residual exceeded 10⁶ times its start, or is not a number.
     Diverged,
-    /// No step of the method reduces the residual any more.
+    /// The method has no step that reduces the residual.
     Stalled,
 }
 
 /// Result of an iterative method.
 #[derive(Clone, Debug)]
 pub struct IterativeRun {
-    /// Last impulses (N·s).
+    /// Final impulses (N·s).
     pub impulses: Vec<DPair>,
-    /// v⁺ that follows from them.
+    /// v⁺ that follows from the impulses.
     pub velocities: Vec<Velocity>,
     /// Relative natural-map residual: of the start, then after every iteration.
     pub history: Vec<f64>,
@@ -77,7 +77,7 @@ impl ScalarRows {
         ScalarRows { inverse: diagonal.iter().zip(&law).map(invert).collect(), law, lines }
     }
 
-    /// Normal impulse that would satisfy row `i` alone; NaN stays NaN, so that divergence shows.
+    /// Normal impulse that would satisfy row `i` alone. NaN stays NaN, so that divergence is detected.
     fn normal(&self, i: usize, vn: f64, ln: f64) -> f64 {
         let un = vn + self.law[i].bias + self.law[i].compliance * ln;
         positive(ln - un * self.inverse[i][0])
@@ -89,7 +89,7 @@ impl ScalarRows {
     }
 }
 
-/// One Gauss–Seidel pass over joints, then contacts; or the other way round, from last to first.
+/// One Gauss–Seidel pass over joints, then contacts. A reversed pass runs from last to first.
 pub(super) fn gauss_seidel(
     problem: &ContactProblem,
     rows: &ScalarRows,
@@ -150,7 +150,7 @@ pub enum SweepDirection {
     Symmetric,
 }
 
-/// Iterates `step` from `start` until `stop`, measuring after every iteration.
+/// Iterates `step` from `start` until `stop`, and measures the residual after every iteration.
 pub(super) fn iterate(
     problem: &ContactProblem,
     target: Target,
@@ -162,7 +162,8 @@ pub(super) fn iterate(
     let mut impulses = start.to_vec();
     let mut history = Vec::new();
     loop {
-        // Afresh from the impulses, so that rounding of millions of updates does not add up.
+        // Velocities are recomputed from the impulses, so that the rounding of millions of updates does not
+        // accumulate.
         let mut velocities = problem.velocities(&impulses);
         let residual = measure.natural_map(&velocities, &impulses) / unit;
         history.push(residual);
@@ -197,12 +198,12 @@ pub fn pgs(
     })
 }
 
-/// How Jacobi shares a body among its rows.
+/// How Jacobi divides the mass of a body among its rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Splitting {
-    /// Every row sees the whole mass; may diverge.
+    /// Every row uses the whole mass; may diverge.
     Whole,
-    /// Every row sees its share of the mass.
+    /// Every row uses its share of the mass.
     Mass,
 }
 
@@ -252,7 +253,7 @@ fn split_diagonal(problem: &ContactProblem) -> Vec<DPair> {
     diagonal
 }
 
-/// Rows on each body: two per contact with friction, and all of its joints.
+/// Number of rows on each body: two per contact with friction, and all rows of its joints.
 fn shares(problem: &ContactProblem) -> Vec<f64> {
     let mut count = vec![0.0; problem.bodies.len()];
     for c in &problem.contacts {
@@ -279,7 +280,7 @@ mod tests {
         vec![[0.0; 2]; p.contacts.len()]
     }
 
-    /// Far above the rounding floor, far below the first modes' decay.
+    /// Far above the rounding floor, and far below the level at which other modes matter.
     const DEEP: Stop = Stop { tolerance: 1e-10, iterations: 20_000 };
 
     #[test]
@@ -290,7 +291,7 @@ mod tests {
             assert_eq!(run.status, Status::Converged);
             let exact = (PI / (2.0 * n as f64)).cos().powi(2);
             let measured = rate(&run.history).unwrap();
-            // The next mode, cos²(3π/2n), is 10⁹ times smaller when the last decade begins.
+            // The next mode, cos²(3π/2n), is 10⁹ times smaller at the start of the last decade.
             assert!((measured - exact).abs() < 1e-6, "n {n}: {measured} is not {exact}");
         }
     }
@@ -302,7 +303,7 @@ mod tests {
             let run = jacobi(&p, Target::Rigid, &cold(&p), Splitting::Whole, DEEP);
             let exact = (PI / (2.0 * n as f64)).cos();
             let measured = rate(&run.history).unwrap();
-            // Modes ±cos θ alternate, which a fit over a decade averages to a few 10⁻⁴.
+            // The modes ±cos θ alternate. A fit over a decade averages this to a few 10⁻⁴.
             assert!((measured - exact).abs() < 1e-3, "n {n}: {measured} is not {exact}");
         }
     }
@@ -313,7 +314,8 @@ mod tests {
             for (p, exact) in [(heavy_on_light(r), r / (1.0 + r)), (light_on_heavy(r), 1.0 / (1.0 + r))] {
                 let run = pgs(&p, Target::Rigid, &cold(&p), SweepDirection::Forward, DEEP);
                 assert_eq!(run.status, Status::Converged);
-                // Light on heavy gains more than a decade per sweep or two: nothing to fit.
+                // Light on heavy converges by more than a decade in one or two sweeps: too few points for a
+                // fit.
                 if exact > 0.2 {
                     let measured = rate(&run.history).unwrap();
                     assert!((measured - exact).abs() < 1e-6, "{}: {measured} is not {exact}", p.name);
@@ -339,7 +341,7 @@ mod tests {
         assert_ne!(whole.status, Status::Converged);
         let split = jacobi(&p, Target::Rigid, &cold(&p), Splitting::Mass, DEEP);
         assert_eq!(split.status, Status::Converged);
-        // The error in the energy norm falls monotonically; the maximum norm may wobble a little.
+        // The error in the energy norm falls monotonically; the maximum norm may fluctuate slightly.
         assert!(split.history.windows(2).all(|w| w[1] <= 1.001 * w[0]), "{:?}", &split.history[..20]);
         assert!(p.mass_norm(&split.velocities) < 1e-9);
     }
@@ -355,7 +357,7 @@ mod tests {
             Stop { tolerance: 1e-14, iterations: 1000 },
         );
         assert_eq!(run.status, Status::Converged);
-        // 7 N and 13 N times h; the residual bounds the error up to the condition number, some 10.
+        // 7 N and 13 N times h. The residual bounds the error up to the condition number, about 10.
         assert!((run.impulses[0][0] - 7.0 * p.h).abs() < 1e-12);
         assert!((run.impulses[1][1] + 0.3 * 13.0 * p.h).abs() < 1e-12);
     }

@@ -1,18 +1,18 @@
-//! Which law a residual is measured against.
+//! The law that a residual refers to.
 
 use super::problem::ContactProblem;
 use super::rows::OwnRow;
 
-/// The right-hand side b of un = Jn v + b that a residual is measured against.
+/// The right-hand side b of un = Jn v + b that a residual refers to.
 ///
-/// "Is this the contact law?" and "did the solver solve what it set out to solve?" are different
-/// questions; the type keeps their answers apart.
+/// "Does the result obey the contact law?" and "did the solver solve its own equations?" are different
+/// questions. The type keeps their answers apart.
 #[derive(Clone, Copy, Debug)]
 pub enum Target<'a> {
-    /// Rigid law: b = max(gap, 0)/h − rebound. Open contacts may close within the step,
-    /// overlapping ones may not deepen.
+    /// Rigid law: b = max(gap, 0)/h − rebound. Open contacts may close within the step, overlapping ones may
+    /// not deepen.
     Rigid,
-    /// The solver's own law: one row for every contact of the problem, then one for every row of its joints.
+    /// The solver's own law: one row for every contact of the problem, then one for every joint row.
     Own(&'a [OwnRow]),
 }
 

@@ -5,10 +5,10 @@ use super::rows::{BlockLaw, ProblemBlock, ProblemJoint, ROWS, inverted};
 use crate::lab::error::Error;
 
 impl ContactProblem {
-    /// Checks that the name is one line, all numbers are finite and in range, all indices valid, and
-    /// that every contact has a side that answers to impulses, and every block of a joint has rows that do.
+    /// Checks that the name is one line, all numbers are finite and in range, all indices are valid, every
+    /// contact has a side that responds to impulses, and every joint block has rows that do.
     pub fn validate(&self) -> Result<(), Error> {
-        // Names go into tables.
+        // Names appear in tables.
         require(!self.name.chars().any(char::is_control), "name", || {
             format!("must not have control characters, is {:?}", self.name)
         })?;
@@ -38,7 +38,7 @@ impl ContactProblem {
             }
             require(c.body_a != c.body_b, place(), || format!("both sides are {:?}", c.body_a))?;
             let length = c.normal[0].hypot(c.normal[1]);
-            // Normals that come from f32 are unit only to their own precision.
+            // Normals computed in f32 have unit length only to f32 precision.
             require((length - 1.0).abs() < 1e-5, place(), || {
                 format!("the normal has length {length}, must be 1")
             })?;
@@ -78,7 +78,7 @@ impl ContactProblem {
         for row in &block.rows {
             finite(place, &[row.axis[0], row.axis[1], row.arm_a, row.arm_b, row.error, row.warm_impulse])?;
             let length = row.axis[0].hypot(row.axis[1]);
-            // As normals.
+            // The same precision as for normals.
             require(row.is_angular() || (length - 1.0).abs() < 1e-5, place, || {
                 format!("the axis has length {length}, must be 1, or 0 of an angle")
             })?;
@@ -104,7 +104,7 @@ impl ContactProblem {
     }
 }
 
-/// Most blocks of a joint.
+/// Maximum number of blocks in a joint.
 pub const BLOCKS: usize = 6;
 
 fn require(ok: bool, place: impl Into<String>, message: impl FnOnce() -> String) -> Result<(), Error> {

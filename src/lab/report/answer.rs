@@ -1,5 +1,5 @@
-//! The study in a page: what to use and when, what speaks against it, what to use on each scene, who falls,
-//! what was left out.
+//! The answer of a study on one page: which solver to use and when, the drawbacks, the best setting on each
+//! scene, which solvers fail, and what was left out.
 
 use super::environment::Environment;
 use super::table::{PAGE_WIDTH, finish, narrow, table};
@@ -17,10 +17,10 @@ use crate::lab::study::{self, Record};
 const MOST_RANKED: usize = 8;
 const MOST_NOTES: usize = 7;
 
-/// Waits beyond this share of the time are worth a warning (1).
+/// Waiting beyond this fraction of the time causes a warning (1).
 const BUSY: f64 = 0.02;
 
-/// The columns of the answer.
+/// Description of the columns of the answer.
 const LEGEND: &str = "\
 Good enough (plausible): the scene holds, stands for a minute if it has to rest, and its errors are within the
 tolerances of the scene (`simpulse scene NAME`): pen., penetration (1 cm for bodies of 1 m); res., contact-law residual
@@ -29,7 +29,7 @@ them; exact: within 1 %. µs/step: mean over the run, its median, its longest st
 solver, and how much slower it is; tie: too close to call.
 ";
 
-/// The answer of a study, from its records alone; `steps` if runs were cut to so many.
+/// The answer of a study, from its records alone; `steps` if runs were limited to that many steps.
 pub fn text(records: &[Record], environment: &Environment, steps: Option<u32>) -> String {
     let scenes: Vec<Answer> = records.chunk_by(|a, b| a.scene == b.scene).filter_map(Answer::of).collect();
     let ranking = ranking(records);
@@ -47,7 +47,7 @@ pub fn text(records: &[Record], environment: &Environment, steps: Option<u32>) -
     text + &format!("\n{LEGEND}") + &left_out(records) + &differing(records)
 }
 
-/// The recommendation with its conditions, and the rank of the default solver. Also for the page.
+/// The recommendation with its conditions, and the rank of the default solver. The HTML page uses it too.
 pub fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> String {
     let standings = &ranking.standings;
     let mut text = String::new();
@@ -110,7 +110,7 @@ pub fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> S
     text + "\n"
 }
 
-/// The same with lines of 120 characters at most.
+/// The text in lines of at most 120 characters.
 pub fn wrapped(text: &str) -> String {
     let mut wrapped = String::new();
     for line in text.lines() {
@@ -136,7 +136,7 @@ fn short_list(names: &[String], most: usize) -> String {
     if names.len() > most { format!("{shown} and {} more", names.len() - most) } else { shown }
 }
 
-/// Warnings about the quality of the figures. Also for the page.
+/// Warnings about the quality of the figures. The HTML page uses them too.
 pub fn warnings(records: &[Record], steps: Option<u32>) -> String {
     let mut text = String::new();
     let samples = || records.iter().filter_map(|r| r.sample.as_ref());
@@ -176,7 +176,7 @@ pub fn warnings(records: &[Record], steps: Option<u32>) -> String {
     text
 }
 
-/// The settings that ran, and the machine.
+/// A line on the settings that ran and on the machine.
 fn head(records: &[Record], environment: &Environment, scenes: usize) -> String {
     let mut lanes: Vec<usize> =
         records.iter().filter(|r| r.order == Order::Colored).map(|r| r.lanes).collect();
@@ -215,7 +215,7 @@ fn head(records: &[Record], environment: &Environment, scenes: usize) -> String 
     )
 }
 
-/// A line per scene.
+/// A table with the cheapest setting of each scene.
 fn cheapest(scenes: &[Answer]) -> String {
     let mut rows = table(&["scene", "solver", "budget", "µs/step", "median", "longest", "next", "slower"]);
     let mut notes = String::new();
@@ -257,7 +257,7 @@ fn setting(record: &Record) -> [String; 5] {
     ]
 }
 
-/// `7 sub 1 vel 1 rel @8`, the number of lanes behind.
+/// `7 sub 1 vel 1 rel @8`: the budget, with the number of lanes after `@`.
 fn budget(record: &Record) -> String {
     let width = match record.order {
         Order::Colored if is_emulated(record.lanes) => format!("@{} emulated", record.lanes),
@@ -278,7 +278,7 @@ fn percent(share: f64) -> String {
     }
 }
 
-/// The reason why a setting is not good enough.
+/// Why a setting is not good enough.
 fn worst(record: &Record) -> String {
     if let Some(why) = record.fails_later() {
         return why;
@@ -292,7 +292,7 @@ fn worst(record: &Record) -> String {
     }
 }
 
-/// The other solvers that tie, or the next one, and how much slower it is.
+/// The other solvers that tie or, if none does, the next solver and how much slower it is.
 fn runner_up(answer: &Answer, best: &Record) -> [String; 2] {
     let tied = answer.tied_solvers();
     if let Some(first) = tied.first() {
@@ -315,7 +315,7 @@ fn runner_up(answer: &Answer, best: &Record) -> [String; 2] {
     [next.solver.to_string(), by]
 }
 
-/// Settings that look good in the run and fail later, once per setting.
+/// Settings that are good enough in the run but fail in the extended run, once per setting.
 pub fn fails_later(records: &[Record]) -> Vec<(&Record, String)> {
     let mut found: Vec<(&Record, String)> = Vec::new();
     for record in records {
@@ -327,14 +327,14 @@ pub fn fails_later(records: &[Record]) -> Vec<(&Record, String)> {
     found
 }
 
-/// One of these in words.
+/// One of these settings as text.
 pub fn later_line(r: &Record, why: &str) -> String {
     let order = if r.order.is_serial() { format!(", {} order", r.order.name()) } else { String::new() };
     let time = digits(r.cost_ns() / 1e3);
     format!("{}: {}, {}{order} ({time} µs) passes its run, then {why}", r.scene, r.solver, r.budget_text)
 }
 
-/// Settings that look good and fail later.
+/// Notes on settings that are good enough in the run but fail later.
 fn fallen(records: &[Record]) -> String {
     let found = fails_later(records);
     let lines = found.iter().take(MOST_NOTES).map(|(r, why)| format!("  ! {}\n", later_line(r, why)));
@@ -345,7 +345,8 @@ fn fallen(records: &[Record]) -> String {
     text
 }
 
-/// The errors of the cheapest plausible setting (% of their tolerances), and the cheapest settings beyond plausible.
+/// Errors of the cheapest plausible setting (% of their tolerances), and the cheapest settings at the
+/// stricter levels.
 fn accuracies(scenes: &[Answer], records: &[Record]) -> String {
     let mut rows =
         table(&["scene", "pen.", "res.", "ref.", "rest", "tight: solver, budget", "µs", "exact", "µs"]);
@@ -372,7 +373,7 @@ fn accuracies(scenes: &[Answer], records: &[Record]) -> String {
     finish(narrow(rows, PAGE_WIDTH), 1)
 }
 
-/// All solvers over all scenes.
+/// A table of all solvers over all scenes.
 fn standings(ranking: &Ranking, scenes: usize) -> String {
     let mut rows =
         table(&["solver", "score", "range", "plausible", "tight", "exact", "fastest or tied", "fails on"]);
@@ -397,7 +398,7 @@ fn standings(ranking: &Ranking, scenes: usize) -> String {
     )
 }
 
-/// Gain and cost of waves of impacts, in a line; empty unless both treatments ran.
+/// A line on what solving impacts in waves gains and costs; empty unless both treatments ran.
 fn waves(records: &[Record]) -> String {
     let found = study::impacts::gains(records);
     if found.is_empty() {
@@ -414,7 +415,7 @@ fn waves(records: &[Record]) -> String {
     wrapped(&text)
 }
 
-/// Solvers that the default list leaves out.
+/// A line on the solvers that the default list leaves out.
 fn left_out(records: &[Record]) -> String {
     match study::left_out(&solvers_of(records)).as_slice() {
         [] => String::new(),
@@ -424,7 +425,7 @@ fn left_out(records: &[Record]) -> String {
     }
 }
 
-/// Settings whose times are invalid: their timed runs gave other results.
+/// A warning on settings with invalid times: their timed runs gave other results.
 fn differing(records: &[Record]) -> String {
     match records.iter().filter(|r| r.bits_equal == Some(false)).count() {
         0 => String::new(),
@@ -434,7 +435,7 @@ fn differing(records: &[Record]) -> String {
     }
 }
 
-/// Everything that failed after its run, for `tables.txt`.
+/// Table of all settings that failed after their run, for `tables.txt`.
 pub fn later_table(records: &[Record]) -> String {
     let mut rows = table(&["scene", "solver", "budget", "µs/step", "", "speed at rest"]);
     let mut any = false;
@@ -477,7 +478,7 @@ mod tests {
             let line = text.lines().find(|l| l.starts_with("stack:2")).unwrap();
             line.split_whitespace().collect::<Vec<_>>().join(" ")
         };
-        // Narrow builds emulate eight lanes and say so.
+        // A build with narrower instructions emulates eight lanes and says so.
         let lanes = if is_emulated(8) { "@8 emulated" } else { "@8" };
         let expected = format!("stack:2 pgs 2 sub {lanes} 41.0 41.0 41.0 no other solver –");
         assert_eq!(line(&records), expected);
@@ -562,7 +563,7 @@ mod tests {
         let every: Vec<&'static str> = VARIANTS.iter().map(|v| v.name).collect();
         for solvers in [&study::DEFAULT_SOLVERS[..], &every] {
             let text = page(&all(solvers));
-            // What a study adds are two lines: where the files are.
+            // A study adds two lines: the list of files.
             assert!(text.lines().count() <= 58, "{text}");
             assert!(text.lines().all(|l| l.chars().count() <= PAGE_WIDTH), "{text}");
             let left_out = text.split_once("left out").map_or("", |(_, names)| names);

@@ -1,17 +1,18 @@
 //! The columns of every CSV file, in one place. Tests check that no file has another header.
 //!
-//! Cells are empty where there is nothing: a run that failed has no errors, a scene without a
-//! reference value no distance to it.
+//! A cell is empty if there is no value: a run that failed has no errors, a scene without a reference value
+//! has no distance to it.
 
-/// Version of `study.csv` and `study.json`: it grows with every change that an older program cannot read.
+/// Version of `study.csv` and `study.json`. It is increased with every change that an older program cannot
+/// read.
 pub const SCHEMA: u32 = 3;
 
 /// A column.
 #[derive(Clone, Copy, Debug)]
 pub struct Column {
-    /// In the header. `<phase>_ns` stands for a column of each phase, and so on.
+    /// Name in the header. `<phase>_ns` stands for one column per phase, and so on.
     pub name: &'static str,
-    /// Empty for words and counts; 1 for ratios.
+    /// Unit; empty for words and counts, 1 for ratios.
     pub unit: &'static str,
     /// Its content.
     pub meaning: &'static str,
@@ -20,13 +21,13 @@ pub struct Column {
 /// A kind of CSV file.
 #[derive(Clone, Copy, Debug)]
 pub struct Sheet {
-    /// Its usual name.
+    /// Usual name of the file.
     pub file: &'static str,
     /// The command that writes it.
     pub command: &'static str,
-    /// The subject of a line.
+    /// What a line describes.
     pub line: &'static str,
-    /// In their order.
+    /// Columns, in order.
     pub columns: &'static [Column],
 }
 
@@ -364,17 +365,17 @@ pub static JOINTS: Sheet = Sheet {
     ],
 };
 
-/// All of them.
+/// All kinds of CSV files.
 pub static SHEETS: [&Sheet; 7] = [&STUDY, &CONVERGE, &AGREE, &GROWTH, &STATE, &CONTACTS, &JOINTS];
 
 impl Sheet {
-    /// The names, in their order.
+    /// Names of the columns, in order.
     pub fn names(&self) -> Vec<&'static str> {
         self.columns.iter().map(|c| c.name).collect()
     }
 
-    /// Whether a header has these columns, in their order. Columns with a placeholder may stand any
-    /// number of times, mixed with each other.
+    /// Whether a header has these columns, in this order. A column with a placeholder may occur any number of
+    /// times, mixed with other such columns.
     pub fn documents(&self, header: &[&str]) -> bool {
         let is_any = |c: &Column| c.name.starts_with('<');
         let suffix = |c: &Column| c.name.split_once('>').map_or("", |(_, suffix)| suffix);
@@ -389,7 +390,7 @@ impl Sheet {
     }
 }
 
-/// All columns as text.
+/// Descriptions of all columns, as text.
 pub fn text() -> String {
     let mut text = String::new();
     for sheet in SHEETS {

@@ -1,8 +1,8 @@
-//! Which machine and which compiler a result belongs to.
+//! The machine and the compiler of a result.
 
 use std::sync::OnceLock;
 
-/// Written beside every result.
+/// Description of machine and compiler, written with every result.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Environment {
     /// Model name of the processor.
@@ -15,12 +15,12 @@ pub struct Environment {
     pub architecture: String,
     /// `linux`, …
     pub system: String,
-    /// Instruction sets that the compiler was allowed to use: these, not the processor's,
-    /// decide what a lane width becomes.
+    /// Instruction sets that the compiler was allowed to use. These decide how lanes are implemented, not the
+    /// processor's instruction sets.
     pub target_features: Vec<String>,
-    /// Widest lanes that one instruction of these sets processes.
+    /// Widest lanes that one instruction of these sets can process.
     pub native_lanes: usize,
-    /// Whether the program was built with optimization checks on.
+    /// Whether the program was built with debug assertions.
     pub debug_assertions: bool,
     /// Version of this crate.
     pub version: String,
@@ -34,7 +34,7 @@ impl Environment {
         Environment {
             cpu: cpu_model(),
             processors: std::thread::available_parallelism().map_or(1, |n| n.get()),
-            // The whole program is searched for it, once.
+            // The version is found by searching the whole program file, so it is cached.
             compiler: COMPILER.get_or_init(compiler).clone(),
             architecture: std::env::consts::ARCH.into(),
             system: std::env::consts::OS.into(),
@@ -48,7 +48,7 @@ impl Environment {
 }
 
 impl Environment {
-    /// The widest instructions that the compiler was allowed to use, in the usual spelling.
+    /// Name of the widest instruction set that the compiler was allowed to use.
     pub fn instructions(&self) -> &'static str {
         let names = [
             ("avx512f", "AVX-512"),
@@ -93,8 +93,8 @@ fn native_lanes() -> usize {
     }
 }
 
-/// The compiler writes its version into the comment section of the program; no constant
-/// of the language holds it.
+/// The compiler writes its version into the comment section of the program. No constant of the language
+/// provides it.
 fn compiler() -> String {
     const MARK: &[u8] = b"rustc version ";
     let program = std::env::current_exe().and_then(std::fs::read).unwrap_or_default();

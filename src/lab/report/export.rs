@@ -14,7 +14,7 @@ use crate::lab::study::curve::ErrorAxis;
 use crate::lab::study::{Record, StudyPlan, search};
 use serde_json::{Value, json};
 
-/// One line of the table file; every number is finite, and what there is not is empty.
+/// One line of `study.csv`. Every number is finite; missing values are empty.
 #[derive(serde::Serialize)]
 struct TableLine<'a> {
     schema_version: u32,
@@ -248,10 +248,11 @@ impl<'a> TableLine<'a> {
     }
 }
 
-/// `study.csv`: a line per record. Lengths in m, times in µs and ns, shares in 1.
+/// `study.csv`: a line per record. Lengths in m, times in µs and ns, fractions in units of 1.
 pub fn csv(records: &[Record], environment: &Environment) -> Result<Vec<u8>, Error> {
     let failed = |e: csv::Error| Error::invalid("study.csv", e.to_string());
-    // Columns of the line, and one for each phase: no writer takes both at once.
+    // The fixed columns are serialized first and the columns of the phases are added to each line, because no
+    // writer accepts both together.
     let mut line = csv::WriterBuilder::new().from_writer(Vec::new());
     for record in records {
         line.serialize(TableLine::of(record, environment)).map_err(failed)?;
@@ -275,12 +276,12 @@ pub fn csv(records: &[Record], environment: &Environment) -> Result<Vec<u8>, Err
     writer.into_inner().map_err(|e| Error::invalid("study.csv", e.to_string()))
 }
 
-/// The number with the fewest digits that means the same `f32`: 0.3, not 0.30000001.
+/// The shortest decimal that gives the same `f32`: 0.3, not 0.30000001.
 fn decimal(value: f32) -> Value {
     value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
 }
 
-/// Everything that was chosen, by the caller or by a constant.
+/// All settings of a study, chosen by the caller or constant.
 pub fn settings(plan: &StudyPlan) -> Value {
     #[derive(serde::Serialize)]
     struct ExportedSolver {
@@ -345,7 +346,7 @@ mod tests {
         let text = String::from_utf8(bytes).unwrap();
         let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
         assert!(STUDY.documents(&header), "{header:?}");
-        // Words for one thing: a line of another study stands beside it.
+        // Terms must be consistent with other studies, so these synonyms are not allowed.
         assert!(header.iter().all(|n| !n.contains("law") && !n.contains("truth") && !n.contains("mark")));
     }
 }

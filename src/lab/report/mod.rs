@@ -31,13 +31,12 @@ use crate::lab::study::Record;
 use std::path::{Path, PathBuf};
 use study_file::StudyFile;
 
-/// Names of pictures.
+/// File names of pictures.
 const SWEEP: &str = "sweep.svg";
 const SPEED: &str = "speed_vs_error.svg";
 const PROFILES: &str = "profiles.svg";
 
-/// Everything that a study measured, as tables: per scene, in equal time and to equal error, and the
-/// performance profiles.
+/// All tables of a study: per scene, at equal time and at equal error, and the performance profiles.
 pub fn tables(records: &[Record]) -> String {
     if sweep::is_sweep(records) {
         return sweep::tables(records);
@@ -54,10 +53,10 @@ pub fn tables(records: &[Record]) -> String {
 }
 
 /// Writes `tables.txt`, `study.csv`, `study.json` and pictures (`speed_vs_error.svg` and `profiles.svg`, or
-/// `sweep.svg`) into `folder`, and the [page](html) made from them and what else is there; returns
-/// their paths. Pictures of an earlier study of the other kind are removed.
+/// `sweep.svg`) into `folder`, and the [page](html) made from these and the folder's other files. Returns
+/// their paths. If an earlier study was of the other kind, its pictures are removed.
 ///
-/// All but the page are made before the first is written.
+/// Everything except the page is prepared before the first file is written.
 pub fn write_study(folder: &Path, study: &StudyFile) -> Result<Vec<PathBuf>, Error> {
     let records = &study.records;
     let mut contents = vec![

@@ -1,4 +1,4 @@
-//! Order of contacts against stability: the same settings in every order, as one table.
+//! Stability against the order of contacts: the same settings in every order, as one table.
 
 use super::table::{finish, table};
 use super::units::si;
@@ -12,7 +12,7 @@ Order of contacts.  Settings that hold, of those that ran; median over these of 
 (weights of the lighter body)
 ";
 
-/// A table per scene with a line per solver, where other orders than natural and colored ran; else nothing.
+/// A table per scene with a line per solver. Empty unless orders other than natural and colored ran.
 pub fn text(records: &[Record]) -> String {
     let orders: Vec<Order> =
         Order::ALL.into_iter().filter(|order| records.iter().any(|r| r.order == *order)).collect();
@@ -33,7 +33,8 @@ pub fn text(records: &[Record]) -> String {
     text
 }
 
-/// `2 of 3, 1.2 mm, 4e-3` for the settings of a solver in an order; lanes of one setting count once.
+/// `2 of 3, 1.2 mm, 4e-3` for the settings of a solver in an order. A setting at several lane widths counts
+/// once.
 fn cell(scene: &[Record], solver: &str, order: Order) -> String {
     let mut own: Vec<&Record> = Vec::new();
     for record in scene.iter().filter(|r| r.solver == solver && r.order == order) {

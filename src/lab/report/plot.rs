@@ -1,10 +1,10 @@
-//! `speed_vs_error.svg`: time against error, three panels per scene, one below the other, so that a narrow screen
-//! shows them large enough.
+//! `speed_vs_error.svg`: time against error, three panels per scene. Panels are stacked vertically, so that
+//! they are large enough on a narrow screen.
 //!
-//! Both axes are logarithmic. One color per solver, one marker shape per budget, a white dot on
-//! those in natural order; every marker is the fastest lane width of its setting. A line of steps
-//! shows the least time in which the solver has at most that error: settings are different runs,
-//! and between them there is nothing.
+//! Both axes are logarithmic. One color per solver, one marker shape per budget, a white dot on settings in
+//! natural order. Every marker is at the fastest lane width of its setting. A step line shows the shortest
+//! time in which the solver reaches each error or less; it has steps because settings are separate runs, with
+//! nothing in between.
 
 use super::style::{LEGEND_ROW, legend_places, solver_color, solver_legend};
 use super::units::si_short;
@@ -20,13 +20,13 @@ use plotters::style::text_anchor::HPos;
 const PANEL_WIDTH: i32 = 400;
 const PANEL_HEIGHT: i32 = 222;
 const TITLE_HEIGHT: i32 = 34;
-/// Of the heading, and of the line about markers.
+/// Heights of the heading, and of the line about markers.
 const HEADING: i32 = 34;
-/// Space left of, right of and below a panel, for labels.
+/// Margins left of, right of and below a panel.
 const LEFT: i32 = 78;
 const RIGHT: i32 = 26;
 const BOTTOM: i32 = 58;
-/// Characters of a title that fit under a panel.
+/// Maximum number of characters of a title below a panel.
 const TITLE_LENGTH: usize = 48;
 
 /// The picture as SVG text.
@@ -114,14 +114,14 @@ fn draw_curve(area: &Area, curve: &Curve, color: &RGBColor, at: impl Fn(f64, f64
     Ok(())
 }
 
-/// Name of the horizontal axis, in lines that fit under the panel.
+/// Name of the horizontal axis, in lines that fit below the panel.
 fn title(axis: ErrorAxis, records: &[Record]) -> Vec<String> {
     let truth = records.iter().find_map(|r| r.truth).filter(|_| axis == ErrorAxis::Truth);
     let title = truth.map_or(axis.name().to_string(), |t| format!("error of {}", t.quantity));
     wrapped(&title, TITLE_LENGTH)
 }
 
-/// `1 mm` for lengths and the like, `1e-3` for shares and for much.
+/// `1 mm` for values with a unit; `1e-3` for ratios and large values.
 fn label(value: f64, unit: &str) -> String {
     if !unit.is_empty() && unit != "1" && value < 1e3 {
         return si_short(value, unit);
@@ -152,7 +152,8 @@ mod tests {
         assert!(title(ErrorAxis::Truth, &records).iter().all(|l| l.chars().count() <= TITLE_LENGTH));
         let picture = svg(&records).unwrap();
         assert!(picture.contains("time of a step") && picture.contains("last second"));
-        // The SVG writer escapes nothing that a scene could be called by; failures draw nothing.
+        // The SVG writer escapes none of the characters that a scene name may contain. Failed settings are
+        // not drawn.
         assert!(svg(&[failed(8)]).unwrap().contains("nothing measured"));
     }
 }

@@ -25,7 +25,7 @@ const LEFT: i32 = 70;
 const RIGHT: i32 = 24;
 const BOTTOM: i32 = 56;
 
-/// Factors of the table; the last column is every scene that the solver solves at all.
+/// Factors in the table. The last column is the fraction of scenes that the solver solves at all.
 const FACTORS: [f64; 3] = [1.0, 1.5, 4.0];
 
 fn profiles(records: &[Record]) -> Vec<Profile> {
@@ -33,7 +33,7 @@ fn profiles(records: &[Record]) -> Vec<Profile> {
     ErrorAxis::ALL.into_iter().map(profile).filter(|p| p.scenes > 0).collect()
 }
 
-/// The condition for "solved" on an axis.
+/// Condition on an axis for counting a scene as solved.
 fn tolerance(axis: ErrorAxis) -> String {
     format!("{} in tolerance", axis.name())
 }
@@ -49,7 +49,7 @@ fn draw(records: &[Record], text: &mut String) -> Drawn {
     let (solvers, profiles) = (solvers_of(records), profiles(records));
     let rows = legend_places(&solvers, PANEL_WIDTH).last().map_or(0, |place| place.1 + 1);
     let head = HEADING_LINE * (HEADING.len() as i32 + 1) + LEGEND_ROW * rows;
-    // One panel below the other, so that a narrow screen shows them large enough.
+    // Panels are stacked vertically, so that they are large enough on a narrow screen.
     let size = (PANEL_WIDTH as u32, (head + PANEL_HEIGHT * profiles.len() as i32) as u32);
     let root = SVGBackend::with_string(text, size).into_drawing_area();
     root.fill(&WHITE)?;
@@ -71,7 +71,7 @@ fn panel(area: &Area, top: i32, profile: &Profile) -> Drawn {
     let most = all().fold(2.0, f64::max);
     let mut scale = LogScale::of([1.0, most].into_iter(), 5);
     scale.limits[0] = 1.0;
-    // Room for steps beside each other at both ends.
+    // Margin at both ends for steps drawn next to each other.
     let room = profile.ratios.len() as i32 + 2;
     let y = |share: f64| bottom - room - (share * (bottom - top - 2 * room) as f64).round() as i32;
     for &tick in &scale.ticks {
@@ -89,7 +89,7 @@ fn panel(area: &Area, top: i32, profile: &Profile) -> Drawn {
     write(area, "time relative to the fastest solver", ((left + right) / 2, bottom + 30), 13, HPos::Center)?;
     write(area, &tolerance(profile.axis), ((left + right) / 2, top - 14), 13, HPos::Center)?;
     for (i, (solver, ratios)) in profile.ratios.iter().enumerate() {
-        // Steps that coincide stay visible beside each other.
+        // Steps that coincide are shifted so that all remain visible.
         let shift = 2 * i as i32 - profile.ratios.len() as i32;
         let at = |factor: f64, share: f64| (scale.pixel(factor, left, right), y(share) + shift);
         let mut line = vec![at(1.0, profile.share(i, 1.0))];
@@ -103,7 +103,7 @@ fn panel(area: &Area, top: i32, profile: &Profile) -> Drawn {
     Ok(())
 }
 
-/// The profiles as a table: shares of scenes, a line per solver and error.
+/// The profiles as a table: fractions of scenes, a line per solver and error.
 pub fn profile_table(records: &[Record]) -> String {
     let profiles = profiles(records);
     let mut rows = table(&[
@@ -134,7 +134,7 @@ pub fn profile_table(records: &[Record]) -> String {
         + &finish(rows, 3)
 }
 
-/// Most scenes beside each other in one table of slices.
+/// Maximum number of scenes in one table of slices.
 const SCENES_PER_TABLE: usize = 6;
 
 /// Equal time and equal error: a line per solver and a column per scene.
@@ -174,7 +174,7 @@ pub fn slice_tables(records: &[Record]) -> String {
     text
 }
 
-/// The limit, and then the value of each solver.
+/// The limit, then the value of each solver.
 fn slice_column(slice: &Slice, solvers: &[&str], equal_time: bool) -> Vec<String> {
     let error = |value: f64| match si(value, slice.unit) {
         text if value <= ERROR_FLOOR => format!("≤ {text}"),
@@ -205,7 +205,7 @@ mod tests {
     #[test]
     fn the_slices_say_who_is_tied() {
         let text = slice_tables(&two_solvers());
-        // To the same error of 10 mm: between 10 and 20 µs both, within 3 %.
+        // At an error of 10 mm, both take between 10 and 20 µs, within 3 %.
         let equal_error = &text[text.find("Equal error").unwrap()..];
         let penetration = &equal_error[equal_error.find("penetration").unwrap()..];
         let line = |start: &str| penetration.lines().find(|l| l.starts_with(start)).unwrap();

@@ -11,7 +11,7 @@ larger they are with this feature. frictionless: the scene with every friction c
 same bits: whether both kernels give the same state.
 ";
 
-/// The savings, a line each.
+/// Table of the savings, one per line.
 pub fn savings_table(savings: &[Saving]) -> String {
     let mut text = LEGEND.to_string();
     if savings.is_empty() {

@@ -1,4 +1,4 @@
-//! `study.json`: everything that a study chose and measured, written and read back.
+//! `study.json`: all settings and measurements of a study, written and read back.
 
 use super::columns::SCHEMA;
 use super::environment::Environment;
@@ -12,36 +12,36 @@ use std::path::{Path, PathBuf};
 /// Name of the file in a study's folder.
 pub const NAME: &str = "study.json";
 
-/// A study: whole, cut short, or put together.
+/// A study: complete, interrupted, or merged.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct StudyFile {
     /// [`SCHEMA`]
     pub schema_version: u32,
-    /// Where it ran; for a merged study, where its first part ran.
+    /// Where the study ran; for a merged study, where its first part ran.
     pub environment: Environment,
-    /// Everything that was chosen.
+    /// All settings of the study.
     pub settings: Value,
-    /// Scenes of the plan that have no records, because the study was interrupted or is a part of one.
+    /// Scenes of the plan without records, because the study was interrupted or is a part of another.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing_scenes: Vec<String>,
-    /// Its parts, if it was merged. Times are comparable only within a part.
+    /// The parts, if the study was merged. Times are comparable only within a part.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<ShardInfo>,
     /// A record per setting, scene by scene.
     pub records: Vec<Record>,
 }
 
-/// A part of a study that was put together.
+/// A part of a merged study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ShardInfo {
-    /// Where it ran.
+    /// Where the part ran.
     pub environment: Environment,
-    /// Its scenes.
+    /// Scenes of the part.
     pub scenes: Vec<String>,
 }
 
 impl StudyFile {
-    /// A study that ran here, without some of its scenes.
+    /// A study that ran on this machine; `missing_scenes` are the scenes that did not run.
     pub fn new(plan: &StudyPlan, records: Vec<Record>, missing_scenes: Vec<String>) -> Self {
         StudyFile {
             schema_version: SCHEMA,
@@ -53,10 +53,11 @@ impl StudyFile {
         }
     }
 
-    /// One study of several parts that were chosen alike; `names` is what the parts are called in errors.
-    /// Scenes take turns, the first of every part first, which is the order of a study that was split.
+    /// Merges parts with the same settings into one study; `names` are the names of the parts in errors.
+    /// Scenes are interleaved, the first of every part first, which restores the order of a study that was
+    /// split.
     ///
-    /// Errors: no parts; parts that differ in what was chosen; a scene in two parts.
+    /// Errors: no parts; parts with different settings; a scene in two parts.
     pub fn merged(parts: Vec<StudyFile>, names: &[String]) -> Result<Self, Error> {
         let chosen = |study: &StudyFile| {
             let mut settings = study.settings.clone();
@@ -98,7 +99,7 @@ impl StudyFile {
             let list = study.settings.get("scenes").and_then(Value::as_array).into_iter().flatten();
             list.filter_map(|name| Some(name.as_str()?.to_string())).collect()
         };
-        // What a part did not finish, and what no part had in its plan.
+        // Scenes that a part did not finish, and scenes that no part had in its plan.
         let finished =
             |name: &String| parts.iter().any(|p| plan(p).contains(name) && !p.missing_scenes.contains(name));
         let missing: Vec<String> = parts.iter().flat_map(|p| p.missing_scenes.clone()).collect();
@@ -126,12 +127,12 @@ impl StudyFile {
         Ok(whole)
     }
 
-    /// The scenes that have records, in their order.
+    /// The scenes that have records, in order.
     pub fn scenes(&self) -> Vec<String> {
         self.records.chunk_by(|a, b| a.scene == b.scene).map(|scene| scene[0].scene.clone()).collect()
     }
 
-    /// How the settings were chosen that ran, in a paragraph; empty where the caller chose them.
+    /// A paragraph on how the settings were chosen; empty if the caller chose them.
     pub fn budgets(&self) -> String {
         let search = &self.settings["budget_search"];
         let Some(rule) = search["rule"].as_str() else { return String::new() };
@@ -156,8 +157,7 @@ impl StudyFile {
         text
     }
 
-    /// Warnings that come first: missing scenes, times of several machines. Empty for a
-    /// whole study.
+    /// Warnings to show first: missing scenes, times from several machines. Empty for a complete study.
     pub fn caution(&self) -> String {
         let mut text = String::new();
         if !self.missing_scenes.is_empty() {
@@ -173,7 +173,7 @@ impl StudyFile {
         text
     }
 
-    /// The text of the file, a record a line.
+    /// Contents of the file, one record per line.
     pub fn to_json(&self) -> Result<Vec<u8>, Error> {
         let failed = |e: serde_json::Error| Error::invalid(NAME, e.to_string());
         let head = serde_json::to_string_pretty(&StudyFile {
@@ -186,14 +186,14 @@ impl StudyFile {
         });
         let lines = self.records.iter().map(serde_json::to_string).collect::<Result<Vec<_>, _>>();
         let (head, lines) = (head.map_err(failed)?, lines.map_err(failed)?);
-        // Records are the last member, and the head has none of them.
+        // Records are the last member of the object, and the head contains none.
         let head = head.trim_end_matches(['}', '\n', ']']);
         Ok(format!("{head}\n{}\n  ]\n}}\n", lines.join(",\n")).into_bytes())
     }
 
-    /// Reads the study of a folder, or a file.
+    /// Reads a study from its folder or file.
     ///
-    /// Errors: no such file, or one that is no study, with line and column.
+    /// Errors: no such file, or an invalid study, with line and column.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let path: PathBuf = if path.is_dir() { path.join(NAME) } else { path.into() };
         let text = std::fs::read(&path).map_err(Error::io(&path))?;
@@ -257,7 +257,7 @@ mod tests {
             StudyFile::new(&plan, records, names(missing))
         };
         let names = ["one".to_string(), "two".to_string()];
-        // A study of a, b, c, d, e in two parts.
+        // A study of the scenes a, b, c, d, e in two parts.
         let parts = vec![of(&["a", "c", "e"], &[]), of(&["b", "d"], &[])];
         let parts = parts.into_iter().zip([vec!["b", "d"], vec!["a", "c", "e"]]).map(|(mut part, others)| {
             part.missing_scenes = others.into_iter().map(String::from).collect();
@@ -293,7 +293,8 @@ mod tests {
         let message = StudyFile::read(&path).unwrap_err().to_string();
         assert!(message.contains("x.json") && message.contains("line 2"), "{message}");
         assert!(StudyFile::read(folder.path()).unwrap_err().to_string().contains(NAME));
-        // One of an older program: not where it fails, but what it is.
+        // For a file of an older program, the error names its version instead of the position of the
+        // mismatch.
         std::fs::write(&path, "{\"environment\": {\"version\": \"0.0.9\"}, \"records\": [{}]}").unwrap();
         let message = StudyFile::read(&path).unwrap_err().to_string();
         assert!(message.contains("schema version 1") && message.contains("0.0.9"), "{message}");

@@ -1,9 +1,9 @@
-//! A color and a marker per solver, the same in every plot, whatever else is in it.
+//! A color and a marker per solver, the same in every plot.
 //!
-//! Eight colors that differ with any color vision (Okabe and Ito, yellow darkened for lines on
-//! white) times eight markers. A solver's place decides: first those of [`DEFAULT_SOLVERS`], which
-//! therefore differ in color, then the others of [`VARIANTS`]. Neighbors differ in both, and
-//! sixty-four solvers differ in one of them.
+//! Eight colors that are distinct with any color vision (Okabe and Ito, with yellow darkened for lines on
+//! white) times eight markers. A solver's index decides: first the solvers of [`DEFAULT_SOLVERS`], which
+//! therefore differ in color, then the others of [`VARIANTS`]. Neighbors differ in both color and marker; any
+//! two of sixty-four solvers differ in at least one.
 
 use crate::engine::solvers::VARIANTS;
 use crate::lab::picture::Color;
@@ -16,7 +16,7 @@ use plotters::style::text_anchor::HPos;
 const COLORS: [&str; 8] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#222222", "#8a7f00"];
 
-/// How a solver is drawn.
+/// Color and marker of a solver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Style {
     /// CSS color.
@@ -58,7 +58,8 @@ const MARKERS: [Marker; 8] = [
 ];
 
 impl Style {
-    /// Of the solver of this name; one that this program does not have gets one by its letters.
+    /// Style of the solver of this name. A name that this program does not have gets a style computed from
+    /// its letters.
     pub fn of(solver: &str) -> Style {
         let others = VARIANTS.iter().map(|v| v.name).filter(|name| !DEFAULT_SOLVERS.contains(name));
         let known = DEFAULT_SOLVERS.into_iter().chain(others).position(|name| name == solver);
@@ -77,7 +78,7 @@ impl Style {
 }
 
 impl Marker {
-    /// The shape as an SVG path around a point; `r` is half its width.
+    /// The shape as an SVG path around a point. `r` is half of its width.
     pub fn path(self, [x, y]: [f64; 2], r: f64) -> String {
         use crate::lab::picture::svg::px;
         let polygon = |corners: &[[f64; 2]]| {
@@ -138,7 +139,7 @@ pub fn solver_color(solver: &str) -> RGBColor {
 /// Height of a row of [`solver_legend`] (pixels).
 pub const LEGEND_ROW: i32 = 20;
 
-/// Where the entries of [`solver_legend`] stand: columns in pixels, rows by number.
+/// Positions of the entries of [`solver_legend`]: x in pixels, and the index of the row.
 pub fn legend_places(solvers: &[&str], right: i32) -> Vec<(i32, i32)> {
     let (mut x, mut row) = (LEGEND_LEFT, 0);
     let place = |name: &&str| {
@@ -154,7 +155,8 @@ pub fn legend_places(solvers: &[&str], right: i32) -> Vec<(i32, i32)> {
 
 const LEGEND_LEFT: i32 = 12;
 
-/// A name and a stroke per solver, the first row at `y`, as wide as `right`; returns where the row below them is.
+/// Draws a name and a stroke per solver, in rows from `y` on, up to the x coordinate `right`; returns the y
+/// coordinate below the last row.
 pub fn solver_legend(
     area: &Area,
     solvers: &[&str],
@@ -187,7 +189,7 @@ mod tests {
         assert_eq!(Style::at(0).rgb(), Color(0x00, 0x72, 0xb2, 255));
         let colors = DEFAULT_SOLVERS.map(|name| Style::of(name).color);
         assert!((0..colors.len()).all(|i| !colors[..i].contains(&colors[i])), "{colors:?}");
-        // One that is not here keeps its own, too.
+        // An unknown name has a fixed style, too.
         assert_eq!(Style::of("somebody_elses"), Style::of("somebody_elses"));
     }
 }

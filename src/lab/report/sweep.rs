@@ -1,4 +1,4 @@
-//! A sweep as text: what each solver can do at which values, and a table of times and errors.
+//! A sweep as text: the values at which each solver is good enough, and a table of times and errors.
 
 use super::environment::Environment;
 use super::table::{finish, table};
@@ -22,7 +22,7 @@ pub fn is_sweep(records: &[Record]) -> bool {
     records.iter().any(|r| r.swept.is_some())
 }
 
-/// All scenes, with a legend and where it ran.
+/// All scenes, with a legend and a description of the machine.
 pub fn text(records: &[Record], environment: &Environment) -> String {
     let Some(swept) = records.iter().find_map(|r| r.swept) else { return String::new() };
     let mut text = format!(
@@ -52,7 +52,7 @@ fn value(record: &Record) -> f64 {
     record.swept.map_or(0.0, |s| s.value)
 }
 
-/// Where the scene is good enough, and its table, solver by solver.
+/// The values at which each solver is good enough on a scene, and the scene's table.
 fn scene_text(scene: &[Record], swept: Swept) -> String {
     let mut text = format!("{} · {}\n", scene[0].scene, bodies(scene[0].bodies));
     let unit = if swept.unit.is_empty() { String::new() } else { format!(" ({})", swept.unit) };
@@ -117,8 +117,8 @@ fn words(values: &[f64], swept: Swept) -> String {
     format!("{} {}", words.join(", "), swept.unit).trim_end().to_string()
 }
 
-/// Values of the sweep for which a solver has the same errors to the last digit: it may limit the quantity, as
-/// soft contacts limit their stiffness.
+/// Groups of swept values at which a solver has exactly the same errors. The solver may limit the quantity,
+/// as soft contacts limit their stiffness.
 fn alike(scene: &[Record], solver: &str) -> Vec<Vec<f64>> {
     let mut own: Vec<&Record> = scene.iter().filter(|r| r.solver == solver && r.errors.is_some()).collect();
     own.sort_by(|a, b| value(a).total_cmp(&value(b)));
@@ -154,7 +154,7 @@ fn row(record: &Record) -> Vec<String> {
     ]
 }
 
-/// Good enough, how far from it, or what happened.
+/// `good enough`, the distance from it, or the failure.
 fn verdict(record: &Record) -> String {
     if let Some(mark) = record.mark() {
         let step = record.broken.map(|b| b.step).or(record.failure.map(|f| f.step));

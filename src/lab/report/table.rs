@@ -1,4 +1,4 @@
-//! Tables for the terminal, to be read at 160 columns.
+//! Tables for a terminal of 160 columns.
 
 use super::units::{bodies, digits, is_emulated, ratio, si};
 use crate::engine::world::Order;
@@ -6,7 +6,7 @@ use crate::lab::metrics::Errors;
 use crate::lab::study::{self, Fronts, Record, TruthError};
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
-/// The columns of [`scene_table`], once for the whole study.
+/// Description of the columns of [`scene_table`], printed once per study.
 pub const LEGEND: &str = "\
 budget: substeps; then velocity (vel), relaxation (rel) and position (pos) sweeps per substep.
 lanes: natural means one contact after the other in natural order; a number means colored order in so many lanes.
@@ -21,7 +21,7 @@ sweeps: per step.  colors: of contacts.  occupancy: share of lanes that hold a c
 Pareto: on the Pareto front of time against p penetration, l contact-law residual, t reference value.
 ";
 
-/// Lines of a table without the frame.
+/// A table without a frame.
 pub(crate) fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Disabled);
@@ -29,18 +29,19 @@ pub(crate) fn table(header: &[&str]) -> Table {
     table
 }
 
-/// Longest line of the page that a study prints (characters).
+/// Maximum line length of the page printed by a study (characters).
 pub const PAGE_WIDTH: usize = 120;
 
-/// The same table with at most `width` characters a line: cells that are too long go on below.
+/// The same table with at most `width` characters per line; long cells are wrapped.
 pub(crate) fn narrow(mut table: Table, width: usize) -> Table {
     table.set_content_arrangement(ContentArrangement::Dynamic);
-    // Two of them are the blanks behind the last column.
+    // Two of these are the blanks after the last column.
     table.set_width(width as u16 + 2);
     table
 }
 
-/// Every column but the first `left` to the right, and two blanks between columns.
+/// Text of a table. All columns except the first `left` are right-aligned; columns are separated by two
+/// blanks.
 pub(crate) fn finish(mut table: Table, left: usize) -> String {
     for (i, column) in table.column_iter_mut().enumerate() {
         column.set_padding((0, 2));
@@ -52,7 +53,7 @@ pub(crate) fn finish(mut table: Table, left: usize) -> String {
     text.lines().map(|line| line.trim_end().to_string() + "\n").collect()
 }
 
-/// The records of one scene, errors once per solver, budget and order.
+/// Table of the records of one scene; errors appear once per solver, budget and order.
 pub fn scene_table(records: &[Record]) -> String {
     let Some(first) = records.first() else { return String::new() };
     let mut text = format!("{} · {} · dt {}", first.scene, bodies(first.bodies), si(first.dt, "s"));
@@ -168,7 +169,7 @@ fn front(fronts: &Fronts) -> String {
     if on.is_empty() { "–".to_string() } else { on }
 }
 
-/// Gain and cost of waves of impacts; empty unless both treatments ran.
+/// Table of what solving impacts in waves gains and costs; empty unless both treatments ran.
 pub fn impacts_table(records: &[Record]) -> String {
     let found = study::impacts::gains(records);
     if found.is_empty() {
@@ -188,7 +189,7 @@ pub fn impacts_table(records: &[Record]) -> String {
     )
 }
 
-/// The errors that stand beside a time, on one line.
+/// The errors printed next to a time, on one line.
 pub fn error_line(errors: Option<&Errors>) -> String {
     match errors {
         Some(e) => format!(
@@ -203,7 +204,7 @@ pub fn error_line(errors: Option<&Errors>) -> String {
     }
 }
 
-/// The errors of one run, a line each; what is absent has none.
+/// The errors of one run, one per line. Errors that do not exist are left out.
 pub fn error_list(errors: &Errors) -> String {
     let e = errors;
     let length = |value: f64| si(value, "m");
@@ -274,7 +275,7 @@ mod tests {
         assert_eq!(text.matches(" blew up ").count(), 1, "{text}");
         assert!(text.contains("failed: pgs, 9 sub, 1: diverged at step 7: body 2 has no finite speed"));
         assert!(text.contains("state differs from the error run: pgs, 1 sub, 8"));
-        // No cell is blank.
+        // No cell is empty.
         let columns = |line: &str| line.split("  ").filter(|cell| !cell.trim().is_empty()).count();
         let lines: Vec<usize> = text.lines().skip(3).take(4).map(columns).collect();
         assert_eq!(lines, [22; 4], "{text}");

@@ -55,7 +55,7 @@ pub(super) const ARCH: Entry = Entry::new("arch", "an arch of 17 stones with fou
 // Eight joints up to the keystone, its own, and four boxes.
 .within(|scene, _| Tolerances::standard(scene).joints(13.0));
 
-/// The points are the stone's in the world; its body stands at the origin.
+/// A stone with these corners in the world, before scaling; its body is at the origin.
 fn stone(points: [[f64; 2]; 4]) -> SceneBody {
     let points = points.map(|[x, y]| [SCALE * x, SCALE * y]).to_vec();
     SceneBody::dynamic([0.0, 0.0], SceneShape::polygon(points))

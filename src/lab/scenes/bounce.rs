@@ -4,9 +4,9 @@
 //! H e^(2k). Between impacts semi-implicit Euler keeps
 //! Q = y + v²/(2g) − v h/2 exactly: with v' = v − g h and y' = y + h v',
 //! Q' − Q = h v' + (v'² − v²)/(2g) + g h²/2 = h v − g h² − v h + g h²/2 + g h²/2 = 0.
-//! At rest on top Q is the height, so Q near an apex is the apex, free of
-//! sampling. What is left is the solver's own: when in the step it applies the
-//! restitution, and how much energy that makes or loses.
+//! At the top, at rest, Q is the height, so Q near an apex is the height of the apex, independent of
+//! sampling. The rest is the solver's own error: when in the step it applies restitution, and how much energy
+//! that adds or removes.
 
 use super::holds::Demand;
 use super::parts::ground_line;
@@ -39,7 +39,7 @@ pub(super) const ELASTIC: Entry =
     .holds(&[Demand::GainsNoEnergy])
     .within(tolerances);
 
-/// Rising to `apex` (m) after the first impact.
+/// Tolerances for a disc that rises to `apex` (m) after the first impact.
 fn tolerances(scene: &Scene, apex: f64) -> Tolerances {
     Tolerances::impacts(scene).fixed(
         (2.0, "a rebound is compared with the approach at the step's start: up to 1 + e weights"),
@@ -52,9 +52,8 @@ fn scene(name: &str, height: f64, restitution: f64) -> Scene {
     Scene::new(name, vec![ground_line(10.0), SceneBody::dynamic([0.0, RADIUS + height], disc)])
 }
 
-/// Impacts that bounce: v_k = √(2gH) e^(k−1) at impact k must reach the threshold,
-/// so k < 1 + ln(v_1/threshold)/ln(1/e). From 10 m at e = 0.5: 14.1, 7.1, 3.5 and
-/// 1.8 m/s, but no longer 0.9 m/s.
+/// Number of impacts that bounce: v_k = √(2gH) e^(k−1) at impact k must reach the threshold, so k < 1 +
+/// ln(v_1/threshold)/ln(1/e). From 10 m at e = 0.5: 14.1, 7.1, 3.5 and 1.8 m/s, but no longer 0.9 m/s.
 fn counted(height: f64, restitution: f64) -> u32 {
     let impact = (2.0 * G * height).sqrt() / f64::from(RESTITUTION_THRESHOLD);
     (impact.ln() / restitution.recip().ln()).ceil() as u32
@@ -66,8 +65,8 @@ fn truth(quantity: &'static str, scene: &Scene, height: f64, restitution: f64, b
     Truth::new(quantity, "m", first, Apexes::new(u64::from(scene.steps), expected))
 }
 
-/// Compares the first apexes with what they should be. A bounce that has not
-/// happened by the last step has apex 0.
+/// Compares the first apexes with their expected heights. A bounce that has not happened by the last step has
+/// apex 0.
 struct Apexes {
     last_step: u64,
     expected: Vec<f64>,
@@ -83,7 +82,7 @@ impl Apexes {
 
     fn see(&mut self, view: &View) {
         let (v, y) = (view.velocity(1)[1], view.center(1)[1] - RADIUS);
-        // A NaN counts as an apex, so that it is not taken for a bounce that never came.
+        // A NaN counts as an apex, so that it is not mistaken for a missing bounce.
         if (self.rising && v <= 0.0) || v.is_nan() {
             self.found.push(y + v * v / (2.0 * G) - 0.5 * v * view.h());
         }
@@ -97,7 +96,7 @@ impl Observer for Apexes {
         self.see(&View::of(world));
     }
 
-    /// The worst of all apexes; none before the last step.
+    /// The worst error of all apexes; `None` before the last step.
     fn error(&self) -> Option<f64> {
         if self.step < self.last_step {
             return None;
@@ -113,7 +112,7 @@ mod tests {
     use crate::lab::scenes::truth::by_hand;
 
     /// Semi-implicit Euler at 1/256 s, bouncing at the end of a substep below ground.
-    /// The exact variant puts the ball where Q is what e² leaves of it.
+    /// The exact variant puts the ball where Q is e² times its value before.
     fn run(height: f64, restitution: f64, steps: u64, exact: bool) -> Apexes {
         let mut apexes = Apexes::new(
             steps,

@@ -1,13 +1,12 @@
 //! C14: a house of cards, five levels high.
 //!
-//! Statics lets it stand: a pair of cards at 25° from the vertical needs base
-//! friction of tan 25°/2 = 0.233 without load and at most tan 25° = 0.466 with
-//! any load, and there is 0.7.
+//! By statics it can stand: a pair of cards at 25° from the vertical needs base friction of tan 25°/2 = 0.233
+//! without load and at most tan 25° = 0.466 with any load. The friction is 0.7.
 //!
-//! The house is built with gaps that close as it settles. A pair is 0.3634 m high and the next
-//! level starts 0.37 m up with a card of 2 mm between: 4.6 mm of air in each of four levels, less
-//! 1.7 mm by which the lowest feet start in the ground. Two tips are 4.2 mm apart, so each moves
-//! 2.1 mm in and 2.1 tan 25° = 1 mm down. Together 22 mm.
+//! The house is built with gaps that close as it settles. A pair is 0.3634 m high, and the next level starts
+//! 0.37 m up with a card of 2 mm between: 4.6 mm of air in each of four levels, minus 1.7 mm by which the
+//! lowest feet start in the ground. Two tips are 4.2 mm apart, so each moves 2.1 mm in and 2.1 tan 25° = 1 mm
+//! down. Together this is 22 mm.
 
 use super::holds::Demand;
 use super::tolerance::Tolerances;

@@ -7,10 +7,11 @@ use super::truth::{Truth, Worst, greatest_drop, rests_at};
 use super::{Entry, Scene, SceneBody, SceneJoint, SceneShape};
 use crate::engine::joints::{JointKind, Weld};
 
-/// The most that joints of links of a meter may stand apart (m).
+/// Limit on the gap of joints of 1 m links (m).
 const GAP: (f64, &str) = (0.005, "half a percent of a link of 1 m starts to be visible");
 
-/// Solver2D's bridge. Links of 160 m over 160 m: any sag is a gap, since a rigid one needs an infinite tension.
+/// Solver2D's bridge: 160 m of links over 160 m. Any sag opens gaps; without gaps the tension would be
+/// infinite.
 pub(super) const BRIDGE: Entry =
     Entry::new("bridge", "160 planks between two points at their distance", |_| {
         let mut bodies = vec![pin([-80.0, 20.0])];
@@ -65,7 +66,7 @@ pub(super) const STRETCHED: Entry =
     .known(|scene, _| rests_at(scene, 40, 0.0))
     .within(|scene, _| Tolerances::standard(scene).truth(0.04, "1 mm at each of 40 joints"));
 
-/// Solver2D's far chain: where it is, floats are 4 mm apart.
+/// Solver2D's far chain: at its position, neighboring floats are 4 mm apart.
 pub(super) const FAR: Entry =
     Entry::new("far_chain", "a chain of 40 links of 0.2 m, 53 km from the origin", |_| {
         let (x, y) = (4e4, -3.5e4 + 4.0);
@@ -83,7 +84,7 @@ pub(super) const FAR: Entry =
     .holds(&[Demand::GainsNoEnergy])
     .within(|scene, _| Tolerances::standard(scene).truth(0.001, "half a percent of a link of 0.2 m"));
 
-/// A beam of welds that do not give way.
+/// A beam of rigid welds.
 pub(super) const CANTILEVER: Entry =
     Entry::new("cantilever", "eight planks welded to a wall and to each other", |_| {
         let mut bodies = vec![SceneBody::fixed([-0.5, 5.0], SceneShape::rectangle(0.5, 0.5))];
@@ -100,10 +101,11 @@ pub(super) const CANTILEVER: Entry =
     .holds(&[Demand::GainsNoEnergy])
     .within(|scene, _| Tolerances::standard(scene).truth(0.08, "1 % of its length"));
 
-/// Rods of 1 m, and the distance of the two pins (m).
+/// Number of 1 m rods, and distance of the two pins (m).
 const HANGING: (u32, f64) = (20, 18.0);
 
-/// B16. Rods of equal weight w between pins: tan θ_k = (N/2 − k + ½) w/H, with H such that their widths add up.
+/// B16. Sag of rods of equal weight w between pins: tan θ_k = (N/2 − k + ½) w/H, with H such that their
+/// widths add up.
 pub(super) fn sag(count: u32, span: f64) -> f64 {
     let tangents = |h: f64| (1..=count).map(move |k| (0.5 * f64::from(count) - f64::from(k) + 0.5) / h);
     let width = |h: f64| tangents(h).map(|t| 1.0 / t.hypot(1.0)).sum::<f64>();
@@ -116,7 +118,7 @@ pub(super) fn sag(count: u32, span: f64) -> f64 {
     tangents(high).filter(|t| *t > 0.0).map(|t| t / t.hypot(1.0)).sum()
 }
 
-/// It starts as a V, so that it has to find its shape.
+/// It starts as a V and must find its shape.
 pub(super) const HANGING_CHAIN: Entry =
     Entry::new("hanging_chain", "20 rods between two pins, at rest", |_| {
         let (count, span) = HANGING;
@@ -140,7 +142,7 @@ pub(super) const HANGING_CHAIN: Entry =
     .known(|scene, _| {
         let (count, span) = HANGING;
         let sag = sag(count, span);
-        // Of an even number of rods the two in the middle meet at the lowest place.
+        // With an even number of rods, the two in the middle meet at the lowest point.
         let lowest = move |view: &super::truth::View| {
             let i = count as usize / 2 + 1;
             let (sin, cos) = (view.bodies.rotation_sin[i], view.bodies.rotation_cos[i]);
@@ -159,7 +161,7 @@ mod tests {
     #[test]
     fn the_sag_of_rods_nears_that_of_the_catenary() {
         assert!((sag(20, 18.0) - 3.818_911).abs() < 1e-6);
-        // The catenary of the same length has 3.814180 m; 200 rods of 0.1 m, counted in rods.
+        // The catenary of the same length has 3.814180 m; 200 rods of 0.1 m, in rod lengths.
         assert!((0.1 * sag(200, 180.0) - 3.814_180).abs() < 1e-4);
     }
 }

@@ -1,4 +1,4 @@
-//! From a scene to a world: every value checked, geometry rounded to `f32`.
+//! Builds a world from a scene: checks every value and rounds geometry to `f32`.
 
 use super::format::{Geometry, Scene, SceneBody, SceneShape};
 pub use crate::engine::bodies::MAX_FRICTION;
@@ -10,32 +10,31 @@ use crate::engine::world::{Settings, World};
 use crate::lab::error::Error;
 use glam::Vec2;
 
-/// Most bodies of a scene.
+/// Maximum number of bodies of a scene.
 pub const MAX_BODIES: usize = 1_000_000;
 
-/// Shortest step (s): shorter ones would be shown as 0, and `f32` rounds most motion in them away.
+/// Shortest step (s): shorter ones would be shown as 0, and `f32` would round most of their motion away.
 pub const MIN_DT: f64 = 1e-9;
 
-/// Longest step (s): in longer ones impulses of ordinary scenes come near what `f32` holds, and
-/// metrics that square them are no numbers.
+/// Longest step (s): in longer ones, impulses of ordinary scenes approach the range of `f32`, and metrics
+/// that square them are not finite.
 pub const MAX_DT: f64 = 1e3;
 
-/// Sizes of typical bodies (m): from cells to planets.
+/// Allowed sizes of typical bodies (m): from cells to planets.
 pub const LENGTH_UNITS: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 
-/// Most steps of a run: 46 hours at 60 steps a second.
+/// Maximum number of steps of a run: 46 hours at 60 steps a second.
 pub const MAX_STEPS: u32 = 10_000_000;
 
 impl Scene {
-    /// Whether a world can be made of this scene.
+    /// Whether a world can be built from this scene.
     ///
-    /// Errors, naming place and value: a name that is empty or has control characters;
-    /// a number that is not finite in `f32`; `dt` below [`MIN_DT`] or above [`MAX_DT`]; `length_unit` outside
-    /// [`LENGTH_UNITS`]; no steps, or more than [`MAX_STEPS`];
-    /// no bodies, or more than [`MAX_BODIES`]; density ≤ 0; negative friction or damping; friction above
-    /// [`MAX_FRICTION`]; restitution outside [0, 1]; a shape that [`Shape`]'s
-    /// constructors refuse; a dynamic body without mass; a joint to a body that is not there, to itself or between two
-    /// bodies that do not move.
+    /// Errors, naming place and value: a name that is empty or has control characters; a number that is not
+    /// finite in `f32`; `dt` below [`MIN_DT`] or above [`MAX_DT`]; `length_unit` outside [`LENGTH_UNITS`]; no
+    /// steps, or more than [`MAX_STEPS`]; no bodies, or more than [`MAX_BODIES`]; density ≤ 0; negative
+    /// friction or damping; friction above [`MAX_FRICTION`]; restitution outside [0, 1]; a shape that
+    /// [`Shape`]'s constructors reject; a dynamic body without mass; a joint to a body that does not exist,
+    /// from a body to itself or between two bodies neither of which is dynamic.
     pub fn validate(&self) -> Result<(), Error> {
         self.check_head()?;
         let check = |(i, body)| body_def(body).map(drop).map_err(|e| e.within(&format!("bodies[{i}]")));
@@ -82,15 +81,15 @@ impl Scene {
         Ok(())
     }
 
-    /// The bodies as a world takes them. Errors: as [`Scene::validate`].
+    /// The bodies as definitions for a world. Errors: as [`Scene::validate`].
     pub fn body_defs(&self) -> Result<Vec<BodyDef>, Error> {
         self.check_head()?;
         let def = |(i, body)| body_def(body).map_err(|e| e.within(&format!("bodies[{i}]")));
         self.bodies.iter().enumerate().map(def).collect()
     }
 
-    /// A world with these bodies, in their order; gravity, step and length unit are the
-    /// scene's, everything else is that of `settings`. Errors: as [`Scene::validate`].
+    /// A world with these bodies, in their order. Gravity, step and length unit are those of the scene,
+    /// everything else is from `settings`. Errors: as [`Scene::validate`].
     pub fn build(&self, settings: Settings) -> Result<World, Error> {
         let bodies = self.body_defs()?;
         let (gravity, length_unit) = (self.gravity.map(|g| g as f32), self.length_unit as f32);
@@ -105,7 +104,7 @@ impl Scene {
 
     /// Whether a solver can run this scene.
     ///
-    /// Errors: the scene has joints with rows, which the solver does not hold, with its reason.
+    /// Errors: the scene has joints with rows and the solver does not support joints, with its reason.
     pub fn runs_on(&self, solver: &Variant) -> Result<(), Error> {
         match solver.holds_no_joints {
             Some(reason) if self.joints.iter().any(|joint| joint.kind != JointKind::Filter) => {
@@ -115,8 +114,8 @@ impl Scene {
         }
     }
 
-    /// Errors, naming place and value: a body that is not there, a joint of a body to itself or between two that cannot
-    /// move, a value out of its range.
+    /// Errors, naming place and value: a body that does not exist, a joint from a body to itself or between
+    /// two bodies neither of which is dynamic, a value out of range.
     fn check_joints(&self) -> Result<(), Error> {
         for (i, joint) in self.joints.iter().enumerate() {
             let place = format!("joints[{i}].{}", joint.kind.name());
@@ -148,7 +147,7 @@ impl Scene {
         Ok(())
     }
 
-    /// The joints between these bodies.
+    /// The scene's joints, between these bodies.
     fn joint_defs<'s>(&'s self, bodies: &'s [BodyHandle]) -> impl Iterator<Item = Joint> + 's {
         self.joints.iter().map(|joint| Joint {
             collide_connected: joint.collide_connected,
@@ -158,7 +157,7 @@ impl Scene {
     }
 }
 
-/// Errors name places within the body.
+/// The definition of a body. Errors name places within the body.
 fn body_def(body: &SceneBody) -> Result<BodyDef, Error> {
     let shape = |(k, shape)| shape_def(shape).map_err(|e| e.within(&format!("shapes[{k}]")));
     let shapes = body.shapes.iter().enumerate().map(shape);
@@ -179,7 +178,7 @@ fn body_def(body: &SceneBody) -> Result<BodyDef, Error> {
     Ok(def)
 }
 
-/// Errors name places within the shape.
+/// The definition of a shape. Errors name places within the shape.
 fn shape_def(shape: &SceneShape) -> Result<ShapeDef, Error> {
     Ok(ShapeDef {
         shape: geometry(&shape.geometry)?,
@@ -189,8 +188,8 @@ fn shape_def(shape: &SceneShape) -> Result<ShapeDef, Error> {
     })
 }
 
-/// The range checks stand in [`Shape`]'s constructors; here only the rounding to
-/// `f32`, which must not make an infinity of a finite number.
+/// [`Shape`]'s constructors check ranges. This only checks that rounding to `f32` does not make a finite
+/// number infinite.
 fn geometry(geometry: &Geometry) -> Result<Shape, Error> {
     let point = |name: &str, p: [f64; 2]| {
         finite_pair(name, p)?;
@@ -240,7 +239,7 @@ fn finite_pair(place: &str, value: [f64; 2]) -> Result<(), Error> {
 
 fn positive(place: &str, value: f64) -> Result<(), Error> {
     finite(place, value)?;
-    // Too small for 32 bits is zero.
+    // A value too small for 32 bits becomes zero.
     if value as f32 > 0.0 {
         return Ok(());
     }

@@ -1,4 +1,4 @@
-//! A box of discs of many sizes: as many bodies as a speed study wants.
+//! A box of discs of many sizes, in any number that a speed study needs.
 
 use super::tolerance::Tolerances;
 use super::{Entry, Scene, SceneBody, SceneShape};
@@ -13,9 +13,8 @@ pub(super) const PILE: Entry = Entry::new("circle_pile", "a box of discs at rand
     .seeded(pile)
     .within(|scene, _| Tolerances::impacts(scene));
 
-/// A disc of radius 0.3 to 0.5 in each cell, up to 0.05 m off its middle: 0.55 m at
-/// most, half a cell, so that none touch. The box is a square of cells wide and
-/// as tall as the discs stand at first.
+/// A disc of radius 0.3 to 0.5 in each cell, up to 0.05 m off its middle: it reaches 0.55 m at most, half a
+/// cell, so that none touch. The cells form a square, which the box encloses.
 fn pile(count: u32, seed: u64) -> Scene {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let columns = f64::from(count).sqrt().ceil() as u32;

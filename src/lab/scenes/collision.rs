@@ -1,17 +1,16 @@
-//! A7: one smooth elastic disc hits another, off center.
+//! A7: a frictionless elastic disc hits another, off center.
 //!
-//! The line of centers makes the angle φ with the path, sin φ = b/(2r) = 0.6.
-//! Equal masses swap their velocities along it and keep those across: the target
-//! leaves with v cos φ = 0.8 v along the line, the other with v sin φ = 0.6 v
-//! across it.
+//! The line of centers is at the angle φ to the path, sin φ = b/(2r) = 0.6. Equal masses exchange their
+//! velocities along it and keep those across it: the target leaves with v cos φ = 0.8 v along the line, the
+//! other with v sin φ = 0.6 v across it.
 
 use super::holds::Demand;
 use super::tolerance::Tolerances;
 use super::truth::{Truth, View, Worst, largest};
 use super::{Entry, Scene, SceneBody, SceneShape};
 
-/// Twice what bounces at least (0.8 of it approach along the normal): at 1 m/s
-/// the restitution threshold of 1 m/s would make the collision plastic (m/s).
+/// Initial speed (m/s): twice the restitution threshold of 1 m/s. The approach along the normal is 0.8 of it;
+/// at 1 m/s the collision would be plastic.
 const SPEED: f64 = 2.0;
 
 pub(super) const OBLIQUE: Entry = Entry::new(

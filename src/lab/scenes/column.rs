@@ -7,8 +7,8 @@ use super::truth::{rests_at, rests_on_ground};
 use super::{Entry, Scene, SceneBody, SceneShape};
 use std::f64::consts::PI;
 
-/// One contact per pair, so every impulse is known: contact i (0 is the ground)
-/// carries (N − i) m g. Exactly centered, the discs have no reason to roll off.
+/// One contact per pair, so every impulse is known: contact i (0 is the ground) carries (N − i) m g. The
+/// discs are exactly centered, so nothing makes them roll off.
 pub(super) const DISCS: Entry = Entry::new("disc_column", "discs of 1 kg on top of each other", |count| {
     let disc = SceneShape::disc(0.5).density(4.0 / PI);
     column("disc_column", count, ground_line(20.0), &disc)
@@ -44,8 +44,8 @@ pub(super) const ZIGZAG: Entry = Entry::new("vertical_stack", "15 boxes dropped 
 .holds(&[Demand::StaysStacked, Demand::Rests])
 .within(|scene, _| Tolerances::impacts(scene).joints(15.0));
 
-/// An unstable equilibrium, but exactly centered: rounding that treats left and
-/// right alike keeps it, so the topmost of 10 discs of radius 1 rests at 19 m.
+/// An unstable equilibrium, but exactly centered: rounding that is symmetric in left and right preserves it,
+/// so the topmost of 10 discs of radius 1 rests at 19 m.
 pub(super) const CIRCLES: Entry = Entry::new("circle_stack", "10 discs dropped on top of each other", |_| {
     let discs = (0..10).map(|i| SceneBody::dynamic([0.0, 4.0 + 3.0 * f64::from(i)], SceneShape::disc(1.0)));
     Scene::new("circle_stack", std::iter::once(ground_line(40.0)).chain(discs).collect())

@@ -9,7 +9,7 @@ use super::{Entry, Geometry, Scene, SceneBody, SceneShape, SegmentGeometry};
 pub(super) const COMPOUNDS: Entry =
     Entry::new("compounds", "3000 bodies of two triangles each, in a box", |_| {
         let mut ground = yard(40, 100);
-        // Catches what jumps over the walls.
+        // Catches bodies that jump over the walls.
         ground.shapes.push(SceneShape::new(Geometry::Segment(SegmentGeometry {
             a: [-800.0, -80.0],
             b: [800.0, -80.0],
@@ -34,7 +34,7 @@ pub(super) const COMPOUNDS: Entry =
     // A body fills 1.5 m² of its 4.5, and half of what is left between piled ones: the rows sink by half.
     .within(|scene, _| Tolerances::impacts(scene).truth(0.5, "none"));
 
-/// Leaning to the left for −1, to the right for 1.
+/// A triangle that leans to the left for −1, to the right for 1.
 fn triangle(side: f64) -> SceneShape {
     SceneShape::polygon(vec![[side, 0.0], [-0.5 * side, 1.0], [0.0, 2.0]]).friction(0.5)
 }

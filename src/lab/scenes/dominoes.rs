@@ -25,5 +25,5 @@ pub(super) const DOMINOES: Entry =
         bodies[1] = bodies[1].clone().moving([impulse / mass, 0.0], -HALF[1] * impulse / inertia);
         Scene::new("double_domino", bodies)
     })
-    // A domino's top falls from its height of a meter.
+    // The top of a domino falls from its height of a meter.
     .within(|scene, _| Tolerances::impacts(scene));

@@ -1,8 +1,8 @@
 //! Expectations in a scene file: conditions that must hold, and known values.
 //!
-//! Scenes of the catalog write it with [`Scene::to_json`], so that a file that was printed is checked as the
-//! scene that it came from. Observers of the catalog that no number describes (the twin of a far stack, the
-//! apexes of a bounce) go by its name, and only as long as the bodies are its own.
+//! Scenes of the catalog write them with [`Scene::to_json`], so that a printed file is checked like the scene
+//! that it came from. Observers of the catalog that no number describes (the twin of a far stack, the apexes
+//! of a bounce) are found by its name, as long as the bodies are unchanged.
 
 use super::Scene;
 use crate::engine::bodies::BodyKind;
@@ -13,8 +13,8 @@ use serde::{Deserialize, Deserializer, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Expect {
-    /// Scene of the catalog whose tolerances, and whose observers that nothing else here describes, hold for
-    /// this one as long as its bodies are the same.
+    /// Scene of the catalog that provides the tolerances, and those observers that nothing else here
+    /// describes, as long as the bodies are the same.
     #[serde(default, deserialize_with = "some", skip_serializing_if = "Option::is_none")]
     pub catalog: Option<String>,
     /// [`Demand::Rests`](super::holds::Demand::Rests)
@@ -40,18 +40,18 @@ pub struct Expect {
     pub reference: Option<KnownValue>,
 }
 
-/// A number that is known about the last second of a run, or about all of it.
+/// A known value of the last second of a run, or of all of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KnownValue {
     /// The measured quantity.
     pub measure: Measure,
-    /// Whose height.
+    /// The body whose height is known.
     #[serde(default, deserialize_with = "some", skip_serializing_if = "Option::is_none")]
     pub body: Option<usize>,
-    /// In the unit of the measure.
+    /// The value, in the unit of the measure.
     pub value: f64,
-    /// The most that a plausible run may be off, in the same unit; > 0.
+    /// Largest error of a plausible run, in the same unit; > 0.
     pub tolerance: f64,
 }
 
@@ -63,11 +63,11 @@ pub enum Measure {
     RestingHeight,
     /// Load of all static bodies over the last second (N).
     GroundLoad,
-    /// Greatest drop of a body's center over the run (m).
+    /// Largest drop of a body's center over the run (m).
     GreatestDrop,
 }
 
-/// What is there is a value: null is none.
+/// A key that is present needs a value: `null` is rejected.
 fn some<'de, T: Deserialize<'de>, D: Deserializer<'de>>(from: D) -> Result<Option<T>, D::Error> {
     T::deserialize(from).map(Some)
 }
@@ -77,7 +77,7 @@ fn is_false(value: &bool) -> bool {
 }
 
 impl Expect {
-    /// Refuses what no run can be held to. Errors name places within `expect`.
+    /// Rejects invalid expectations. Errors name places within `expect`.
     pub(super) fn validate(&self, scene: &Scene) -> Result<(), Error> {
         let positive = |place: &str, value: f64| match value > 0.0 && (value as f32).is_finite() {
             true => Ok(()),

@@ -19,7 +19,7 @@ impl Expect {
                 Demand::GainsNoEnergy => expect.gains_no_energy = true,
                 Demand::StaysWithin(limit) => expect.stays_within = Some(*limit),
                 Demand::Inside(corners) => expect.stays_inside = Some(*corners),
-                // By the name of the scene.
+                // Restored by the name of the scene.
                 Demand::Contains(_) => {}
             }
         }
@@ -33,7 +33,7 @@ impl Expect {
         expect
     }
 
-    /// Its conditions, without those that depend on the name of the scene.
+    /// The conditions, except those that depend on the name of the scene.
     fn demands(&self) -> Vec<Demand> {
         [
             self.stands.then_some(Demand::Stands),
@@ -59,7 +59,7 @@ impl KnownValue {
     }
 }
 
-/// A scene of a file with what it says of a run.
+/// A scene of a file, with its expectations on a run.
 ///
 /// Errors: an unknown scene of the catalog.
 pub fn loaded(scene: Scene) -> Result<Loaded, Error> {
@@ -153,7 +153,7 @@ mod tests {
             change(&mut scene);
             loaded(Scene::from_json(&scene.to_json(), "x.json".as_ref()).unwrap()).unwrap()
         };
-        // A height is a number, and is still checked; the apexes of a bounce go with its bodies.
+        // A height is a number in the file and is still checked; the apexes of a bounce depend on its bodies.
         let heavier = |scene: &mut Scene| scene.bodies[1].shapes[0].density = 7.0;
         let stack = read("stack:3", heavier);
         assert!(stack.truth.is_some() && stack.unchecked.is_empty() && stack.demands.len() == 2);

@@ -1,9 +1,9 @@
 //! B15: the same stack, far from the origin.
 //!
-//! Physics does not know where the origin is, so the trajectory relative to the
-//! start must be that of the same stack at the origin, run with the same settings.
-//! The shift is 10^K m right and as much down. All coordinates are multiples of ½,
-//! and 10^6 + ½ still is an `f32`, so the far scene starts exactly as the near one.
+//! Physics does not depend on the origin, so the trajectory relative to the start must be that of the same
+//! stack at the origin, run with the same settings. The shift is 10^K m to the right and as much down. All
+//! coordinates are multiples of ½, and 10^6 + ½ is still an `f32`, so the far scene starts exactly like the
+//! near one.
 
 use super::column::column;
 use super::holds::Demand;
@@ -40,7 +40,7 @@ fn moved(mut scene: Scene, by: [f64; 2]) -> Scene {
     scene
 }
 
-/// Runs the near scene beside the far one.
+/// Runs the near scene along with the far one.
 struct Twin {
     scene: Scene,
     shift: [f64; 2],
@@ -67,7 +67,7 @@ impl Observer for Twin {
     }
 }
 
-/// Greatest distance of a body from its twin's place (m); infinite where one is NaN.
+/// Largest distance of a body from its twin (m); infinite if one is NaN.
 fn distance(near: &Bodies, far: &Bodies, shift: [f64; 2]) -> f64 {
     let off = |i: usize| {
         let (far, near) = (far.center(i), near.center(i));

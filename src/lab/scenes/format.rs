@@ -15,10 +15,10 @@ use serde::{Deserialize, Deserializer, Serialize};
 use std::fmt;
 use std::path::Path;
 
-/// Steps of a scene that gives none: five seconds at the default step.
+/// Default number of steps: five seconds at the default step.
 pub const DEFAULT_STEPS: u32 = 300;
 
-/// A scene: bodies, gravity, step and number of steps, and what is known about them.
+/// A scene: bodies, gravity, step and number of steps, and expectations on a run.
 ///
 /// Scenes are written in code or read from JSON (`simpulse scene NAME --json` prints one):
 ///
@@ -41,7 +41,7 @@ pub const DEFAULT_STEPS: u32 = 300;
 pub struct Scene {
     /// Name in tables; not empty.
     pub name: String,
-    /// m/s²
+    /// Gravity (m/s²).
     #[serde(default = "default_gravity")]
     pub gravity: [f64; 2],
     /// Step (s), > 0.
@@ -50,10 +50,11 @@ pub struct Scene {
     /// Number of steps of a run, ≥ 1.
     #[serde(default = "default_steps")]
     pub steps: u32,
-    /// Size of typical bodies (m), in [`LENGTH_UNITS`](super::LENGTH_UNITS), see [`Settings::length_unit`](crate::engine::world::Settings::length_unit).
+    /// Size of typical bodies (m), in [`LENGTH_UNITS`](super::LENGTH_UNITS), see
+    /// [`Settings::length_unit`](crate::engine::world::Settings::length_unit).
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub length_unit: f64,
-    /// Conditions on a run; none: it is not checked.
+    /// Conditions on a run; `None` if it is not checked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expect: Option<Expect>,
     /// Bodies, in the order of their indices in a world.
@@ -72,28 +73,28 @@ pub struct SceneBody {
     pub kind: BodyKind,
     /// Origin of the body's frame (m).
     pub position: [f64; 2],
-    /// rad
+    /// Angle (rad).
     #[serde(default, skip_serializing_if = "is_zero")]
     pub angle: f64,
     /// Velocity of the center of mass (m/s).
     #[serde(default, skip_serializing_if = "is_origin")]
     pub velocity: [f64; 2],
-    /// rad/s
+    /// Angular velocity (rad/s).
     #[serde(default, skip_serializing_if = "is_zero")]
     pub angular_velocity: f64,
     /// Factor on gravity (1).
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub gravity_scale: f64,
-    /// 1/s, ≥ 0
+    /// Linear damping (1/s), ≥ 0.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub linear_damping: f64,
-    /// 1/s, ≥ 0
+    /// Angular damping (1/s), ≥ 0.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub angular_damping: f64,
     /// Bodies of the same non-zero group do not collide.
     #[serde(default, skip_serializing_if = "is_no_group")]
     pub group: i32,
-    /// Dynamic bodies stop it, too, where it is fast and continuous collision is on.
+    /// Whether dynamic bodies stop it, too, if it is fast and continuous collision is on.
     #[serde(default, skip_serializing_if = "is_false")]
     pub bullet: bool,
     /// Shapes that move as one.
@@ -104,9 +105,9 @@ pub struct SceneBody {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(into = "ShapeObject")]
 pub struct SceneShape {
-    /// In the frame of the body (m).
+    /// Geometry in the frame of the body (m).
     pub geometry: Geometry,
-    /// kg/m², > 0
+    /// Density (kg/m²), > 0.
     pub density: f64,
     /// Coulomb coefficient, ≥ 0 and ≤ 10⁹; two surfaces mix as √(µa µb).
     pub friction: f64,
@@ -114,7 +115,7 @@ pub struct SceneShape {
     pub restitution: f64,
 }
 
-/// Which points a shape covers (m, rad).
+/// The area that a shape covers (m, rad).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
     /// `{"circle": …}`
@@ -190,8 +191,8 @@ pub struct SegmentGeometry {
     pub b: [f64; 2],
 }
 
-/// A shape as it stands in the file. Serde cannot refuse unknown keys of a
-/// flattened enum, so every geometry is an optional key and one must be there.
+/// A shape in a file. Serde cannot reject unknown keys of a flattened enum, so every geometry is an optional
+/// key, and exactly one must be present.
 #[derive(Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ShapeObject {
@@ -239,8 +240,8 @@ impl TryFrom<ShapeObject> for SceneShape {
     }
 }
 
-/// Not `serde(try_from)`, which would report a wrong number of geometries behind
-/// the whole list of shapes; from inside the map it is reported at the shape.
+/// Not `serde(try_from)`, which would report a wrong number of geometries after the whole list of shapes;
+/// from inside the map it is reported at the shape.
 impl<'de> Deserialize<'de> for SceneShape {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct ShapeVisitor;
@@ -278,11 +279,11 @@ impl From<SceneShape> for ShapeObject {
 impl Scene {
     /// Reads a scene; `path` only names the text in errors.
     ///
-    /// Errors: text that is not JSON of this form, with line, column and place;
-    /// a value out of its range ([`Scene::validate`]), with its place.
+    /// Errors: text that is not JSON of this form, with line, column and place; a value out of range
+    /// ([`Scene::validate`]), with its place.
     pub fn from_json(text: &str, path: &Path) -> Result<Self, Error> {
         let failed = |message| Error::Format { path: path.to_path_buf(), message };
-        // Derived code would take a list of values in the order of the fields.
+        // Derived code would accept a list of values in the order of the fields.
         if let Some(at) = text.find(|c: char| !c.is_whitespace())
             && text[at..].starts_with('[')
         {
@@ -303,8 +304,8 @@ impl Scene {
         Self::from_json(&text, path)
     }
 
-    /// The scene as JSON, one body per line; defaults of bodies and shapes are left out.
-    /// JSON has no NaN, so one becomes `null`, which reading refuses.
+    /// The scene as JSON, one body per line; defaults of bodies and shapes are left out. JSON has no NaN: it
+    /// becomes `null`, which reading rejects.
     pub fn to_json(&self) -> String {
         // Infallible: every map key is a string and nothing here can fail to serialize.
         let line = |value: serde_json::Result<String>| value.unwrap_or_default();
@@ -355,7 +356,7 @@ fn one() -> f64 {
     1.0
 }
 
-// What is left out of a file must come back with the same bits, so −0 is written.
+// Values left out of a file must be read back bit for bit, so −0 is written.
 
 fn same(value: f64, default: f64) -> bool {
     value.to_bits() == default.to_bits()

@@ -50,10 +50,9 @@ pub(super) const SPIN: Entry = Entry::new("free_spin", "a box that spins freely 
 .holds(&[Demand::GainsNoEnergy])
 .within(|scene, _| Tolerances::standard(scene).truth(1e-2, "half a degree starts to be visible"));
 
-/// θ = ω t, but a rotation only tells θ mod 2π. The error of each single step is
-/// below half a turn (at 180 rad/s and 1/60 s a step turns 3 rad, and a body that
-/// does not turn at all is 3 < π off), so the errors of the steps are known and
-/// their sum is the error of the angle, however many turns it reaches.
+/// θ = ω t, but a rotation only gives θ mod 2π. The error of each single step is below half a turn (at 180
+/// rad/s and 1/60 s a step turns 3 rad, and a body that does not turn at all is 3 < π off). The errors of the
+/// steps are therefore known, and their sum is the error of the angle, however many turns it reaches.
 #[derive(Default)]
 struct TurnedAngle {
     last: f64,
@@ -61,7 +60,7 @@ struct TurnedAngle {
 }
 
 impl TurnedAngle {
-    /// The error after one more step, at `angle` (mod 2π), where the step should have turned by `turn` (rad).
+    /// The error after one more step, which ended at `angle` (mod 2π) and should have turned by `turn` (rad).
     fn error(&mut self, angle: f64, turn: f64) -> f64 {
         self.sum += (angle - self.last - turn + PI).rem_euclid(TAU) - PI;
         self.last = angle;

@@ -1,8 +1,9 @@
 //! Conditions on a run, and the words for their violation.
 //!
-//! A run that fails a condition is useless, however fast it is and however small its errors are. Every scene requires
-//! that its kinetic energy has a source (see [`Observation::blown_up`](crate::lab::metrics::Observation::blown_up))
-//! and that no body passes through a static or kinematic one; further conditions are in its row of the catalog.
+//! A run that fails a condition is useless, however fast it is and however small its errors are. Every scene
+//! requires that its kinetic energy has a source (see
+//! [`Observation::blown_up`](crate::lab::metrics::Observation::blown_up)) and that no body passes through a
+//! static or kinematic one. Further conditions are in its row of the catalog.
 
 use super::truth::View;
 use crate::engine::bodies::BodyKind;
@@ -16,21 +17,21 @@ use std::f64::consts::TAU;
 /// Why a run does not hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
-    /// A body left those it stood on.
+    /// A body left the bodies that it stood on.
     Fell,
-    /// A body left its place.
+    /// A body moved too far from its place.
     Slid,
-    /// A body went through another.
+    /// A body passed through another.
     Tunneled,
-    /// Energy came from nowhere.
+    /// Energy had no source.
     BlewUp,
 }
 
 impl Mark {
-    /// All of them.
+    /// Every mark.
     pub const ALL: [Mark; 4] = [Mark::Fell, Mark::Slid, Mark::Tunneled, Mark::BlewUp];
 
-    /// For tables.
+    /// Word for tables.
     pub fn word(self) -> &'static str {
         match self {
             Mark::Fell => "fell",
@@ -41,10 +42,10 @@ impl Mark {
     }
 }
 
-/// The first demand that a run did not meet.
+/// The first condition that a run violated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Broken {
-    /// The word for it.
+    /// Kind of violation.
     pub mark: Mark,
     /// Step, from 1.
     pub step: u64,
@@ -59,49 +60,49 @@ impl std::fmt::Display for Broken {
 /// A condition that every step has to meet.
 #[derive(Clone, Copy, Debug)]
 pub enum Demand {
-    /// Every two bodies that touch at the start stay together: neither moves against the other by
-    /// more than [`LEFT`] of the reach of the smaller one. However far a tall pile sags as a whole,
-    /// a body that is off the next one has fallen.
+    /// Any two bodies that touch at the start stay together: neither moves relative to the other by more than
+    /// [`LEFT`] of the reach of the smaller one. A tall pile may sag as a whole, but a body that leaves its
+    /// neighbor has fallen.
     Stands,
-    /// The bodies, dropped one above the other in their order, end up so: none is beside the next
-    /// one by more than [`LEFT`] of its reach, nor below it.
+    /// The bodies, dropped one above the other, stay in that order: none is offset sideways from the next by
+    /// more than [`LEFT`] of the reach of the smaller one, and none is above the next.
     StaysStacked,
     /// No dynamic body moves farther than this from its start (m).
     StaysWithin(f64),
-    /// No body is outside.
+    /// No body is outside, by the given count.
     Contains(Outside),
-    /// No dynamic body's center is outside of this box, given by its lowest and highest corner (m).
+    /// Every dynamic body's center stays in this box, given by its lower left and upper right corner (m).
     Inside([[f64; 2]; 2]),
-    /// Moving bodies come to rest. How much may move in the end is a tolerance
-    /// ([`Tolerances::rest`](super::tolerance::Tolerances::rest)); here it says that the scene has to stand for a
-    /// minute.
+    /// Moving bodies come to rest. The speed that may remain is a tolerance
+    /// ([`Tolerances::rest`](super::tolerance::Tolerances::rest)); this demand means that the scene must
+    /// stand for a minute.
     Rests,
-    /// Kinetic and potential energy never exceed those of the start by more than [`GAIN`] of the
-    /// largest kinetic energy so far.
+    /// Kinetic plus potential energy never exceeds that of the start by more than [`GAIN`] of the largest
+    /// kinetic energy so far.
     GainsNoEnergy,
 }
 
-/// Counts the bodies that are outside of what should contain them.
+/// Counts the bodies that are outside their container.
 #[derive(Clone, Copy, Debug)]
 pub struct Outside(pub(super) fn(&View) -> usize);
 
-/// Share of a body's reach, from its center to its farthest corner, by which it may move against one
-/// that it touched: a unit box then is 0.35 m off, and its center still above the one below.
+/// Fraction of a body's reach, from its center to its farthest corner, by which it may move relative to a
+/// body that it touched: a unit box is then 0.35 m off, with its center still above the one below.
 pub const LEFT: f64 = 0.5;
 
-/// Share of the largest kinetic energy that may come from nowhere. Semi-implicit Euler itself is off
-/// by up to m g h v/2, that is g h/v of it: 4 % at 4.5 m/s in steps of 1/60 s.
+/// Fraction of the largest kinetic energy that may be gained without a source. Semi-implicit Euler itself has
+/// an error of up to m g h v/2, which is g h/v of that energy: 4 % at 4.5 m/s in steps of 1/60 s.
 pub const GAIN: f64 = 0.1;
 
-/// As much as lifts every body by this share of its own reach may come from nowhere as well (1): where nothing moves, all
-/// energy is that of rounding.
+/// The energy that lifts every body by this fraction of its own reach may be gained as well (1): where
+/// nothing moves, all energy is rounding.
 const LIFT: f64 = 1e-3;
 
-/// Time for which a scene at rest has to stand (s).
+/// Time for which a scene at rest must stand (s).
 pub const HORIZON: f64 = 60.0;
 
 impl Demand {
-    /// In words.
+    /// Description in words.
     pub fn meaning(&self) -> String {
         match self {
             Demand::Stands => "no body leaves the bodies that it stood on (fell)".to_string(),
@@ -127,25 +128,25 @@ impl Demand {
     }
 }
 
-/// Watches a run from before its first step.
+/// Checks the conditions on a run, from before its first step.
 #[derive(Clone, Debug)]
 pub struct HoldWatch {
     demands: Vec<Demand>,
     start: Vec<DVec2>,
     previous: Vec<DVec2>,
-    /// From the center of mass to the farthest point; infinite unless dynamic (m).
+    /// Distance from the center of mass to the farthest point; infinite unless dynamic (m).
     reach: Vec<f64>,
     /// Bodies that touched at the start.
     touching: Vec<[usize; 2]>,
     walls: Walls,
     moving: Vec<MovingWalls>,
-    /// At the start, the largest kinetic energy so far, and that of [`LIFT`] (J).
+    /// Energy at the start, largest kinetic energy so far, and allowance by [`LIFT`] (J).
     energy: [f64; 3],
     broken: Option<Broken>,
 }
 
 impl HoldWatch {
-    /// For a world that has not taken a step yet.
+    /// A watch on a world that has not taken a step yet.
     pub fn new(world: &World, demands: impl Into<Vec<Demand>>) -> Self {
         let demands = demands.into();
         let start = centers(world);
@@ -186,12 +187,12 @@ impl HoldWatch {
         }
     }
 
-    /// The first demand that was not met, if there is one.
+    /// The first violated condition, if there is one.
     pub fn broken(&self) -> Option<Broken> {
         self.broken
     }
 
-    /// Looks at the world after one more step.
+    /// Observes the world after one more step.
     pub fn observe(&mut self, world: &World) {
         if self.broken.is_some() {
             return;
@@ -266,20 +267,20 @@ pub(super) fn energies(world: &World) -> [f64; 2] {
     })
 }
 
-/// Outlines of all static shapes.
+/// Outlines of all static shapes, or of one kinematic body.
 #[derive(Clone, Debug, Default)]
 struct Walls {
-    /// From one end to the other (m), ascending by the lower end.
+    /// Both ends of each edge (m), sorted by the lower end.
     edges: Vec<[DVec2; 2]>,
-    /// The highest end of this edge and all before it (m).
+    /// Highest end of this edge and all before it (m).
     highest: Vec<f64>,
 }
 
-/// A static disc counts as a polygon of so many edges.
+/// Number of edges of the polygon that represents a static disc.
 const DISC_EDGES: usize = 16;
 
 impl Walls {
-    /// Of all static bodies, or of one body in its own frame.
+    /// Outlines of all static bodies, or of one body in its own frame.
     fn of(world: &World, one: Option<usize>) -> Self {
         let bodies = &world.bodies;
         let mut edges = Vec::new();
@@ -310,13 +311,13 @@ impl Walls {
         Walls { highest: highest.collect(), edges }
     }
 
-    /// Whether the way from one point to another crosses an outline.
+    /// Whether the straight path from one point to another crosses an outline.
     fn are_crossed(&self, from: DVec2, to: DVec2) -> bool {
         let (low, high) = (from.y.min(to.y), from.y.max(to.y));
         let begun = self.edges.partition_point(|e| e[0].y.min(e[1].y) <= high);
         let reaching = self.edges[..begun].iter().zip(&self.highest).rev().take_while(|(_, h)| **h >= low);
         reaching.into_iter().any(|(&[a, b], _)| {
-            // On which side of a line through p and q a point is.
+            // Side of the line through p and q on which a point lies.
             let side = |p: DVec2, q: DVec2, point: DVec2| (q - p).perp_dot(point - p) > 0.0;
             side(a, b, from) != side(a, b, to) && side(from, to, a) != side(from, to, b)
         })
@@ -342,7 +343,7 @@ impl BodyFrame {
         BodyFrame { center, rotation: world.bodies.pose(i).rotation.as_dvec2() }
     }
 
-    /// A place of the world in this frame.
+    /// A world point in this frame.
     fn inside(&self, place: DVec2) -> DVec2 {
         DVec2::new(self.rotation.x, -self.rotation.y).rotate(place - self.center)
     }
@@ -353,7 +354,7 @@ impl BodyFrame {
 struct MovingWalls {
     body: usize,
     walls: Walls,
-    /// After the step before.
+    /// Pose after the previous step.
     last: BodyFrame,
 }
 
@@ -397,7 +398,7 @@ mod tests {
 
     #[test]
     fn a_box_off_the_next_one_has_fallen_and_one_that_sags_has_not() {
-        // Reach √½ m, so that 0.354 m are too many.
+        // The reach is √½ m, so 0.354 m are too many.
         assert_eq!(moved("stack:3", &[Demand::Stands], 3, [0.35, 2.5]), None);
         assert_eq!(moved("stack:3", &[Demand::Stands], 3, [0.36, 2.5]), Some(Mark::Fell));
         assert_eq!(moved("stack:3", &[Demand::Stands], 3, [0.0, 2.1]), Some(Mark::Fell));
@@ -411,7 +412,7 @@ mod tests {
         let stays = &[Demand::StaysWithin(0.05)];
         assert_eq!(moved("stack:1", stays, 1, [0.06, 0.5]), Some(Mark::Slid));
         assert_eq!(moved("stack:1", stays, 1, [0.04, 0.5]), None);
-        // Half of it below the ground is not through it, its center is.
+        // With half of it below the ground a box is not through it; with its center below, it is.
         assert_eq!(moved("stack:1", &[], 1, [0.0, 0.01]), None);
         assert_eq!(moved("stack:1", &[], 1, [0.0, -0.01]), Some(Mark::Tunneled));
         assert_eq!(moved("bounce", &[], 1, [3.0, -0.01]), Some(Mark::Tunneled));
@@ -431,7 +432,7 @@ mod tests {
         let fall = |world: &mut World, y: f32, v: f32| {
             (world.bodies.position_y[1], world.bodies.velocity_y[1]) = (y, v);
         };
-        // From 10.5 m: 10 m of fall are 14.14 m/s.
+        // From 10.5 m: a fall of 10 m gives 14.14 m/s.
         fall(&mut world, 0.5, -14.0);
         watch.observe(&world);
         fall(&mut world, 0.5, 14.5);
@@ -470,7 +471,7 @@ mod tests {
             watch.observe(&world);
             watch.broken().map(|b| b.mark)
         };
-        // Both move by 3 m: the ball ends where the door was, and never met it.
+        // Both move by 3 m: the ball ends where the door was, without meeting it.
         assert_eq!(observe(-3.0, -1.0), None);
         assert_eq!(observe(-1.0, 1.0), None);
         // The ball stands, and the door passes it.

@@ -16,17 +16,17 @@ pub struct SceneJoint {
     pub b: usize,
     /// Whether the two bodies collide with each other.
     pub collide_connected: bool,
-    /// Force (N) and torque (N·m) from which on the joint counts as broken.
+    /// Force (N) and torque (N·m) above which the joint counts as broken.
     pub break_load: Option<[f64; 2]>,
-    /// What it holds.
+    /// Type of the joint, with its values.
     pub kind: JointKind,
 }
 
-/// Kinds in files.
+/// Names of the kinds in files.
 const KINDS: [&str; 8] = ["revolute", "prismatic", "distance", "weld", "wheel", "motor", "mouse", "filter"];
 
 impl SceneJoint {
-    /// Between bodies of these indices, which do not collide.
+    /// A joint between the bodies with these indices, which do not collide with each other.
     pub fn new(a: usize, b: usize, kind: JointKind) -> Self {
         SceneJoint { a, b, collide_connected: false, break_load: None, kind }
     }
@@ -36,7 +36,7 @@ impl SceneJoint {
         SceneJoint::new(a, b, JointKind::Revolute(Revolute { anchor_a, anchor_b, ..Revolute::default() }))
     }
 
-    /// The same at these points of the bodies' frames (m); for hinges and welds.
+    /// The same joint with its anchors at these points of the bodies' frames (m); for hinges and welds.
     pub fn at(mut self, a: [f64; 2], b: [f64; 2]) -> Self {
         match &mut self.kind {
             JointKind::Revolute(Revolute { anchor_a, anchor_b, .. })

@@ -9,8 +9,8 @@ use crate::engine::bodies::BodyKind;
 use std::f64::consts::{PI, TAU};
 
 pub(super) const JUNKYARD: Entry = Entry::new("junkyard", "8000 pentagons and a pusher in a box", |_| {
-    // A scene has no script, so the pusher does not swing as x = 60 sin(0.2 t) but goes
-    // the same way, 93 m in 800 steps, at constant speed.
+    // A scene has no script, so the pusher does not swing as x = 60 sin(0.2 t) but covers the same distance,
+    // 93 m in 800 steps, at constant speed.
     let blade = SceneShape::rectangle_at([2.0, 4.0], [0.0, 4.0]);
     let pusher = SceneBody::new(BodyKind::Kinematic, [-46.0, 0.0], blade).moving([7.0, 0.0], 0.0);
     let mut bodies = vec![yard(80, 50), pusher];
@@ -31,7 +31,7 @@ pub(super) const JUNKYARD: Entry = Entry::new("junkyard", "8000 pentagons and a 
 // The highest row starts at 54 m.
 .within(|scene, _| Tolerances::impacts(scene).truth(0.5, "none"));
 
-/// Five points on a circle of radius 0.25 m, each a golden angle on from the last.
+/// Five points on a circle of radius 0.25 m, each one golden angle after the last.
 fn pentagon() -> SceneShape {
     let mut angles: [f64; 5] =
         std::array::from_fn(|i| (i as f64 * PI * (5.0_f64.sqrt() - 1.0)).rem_euclid(TAU));

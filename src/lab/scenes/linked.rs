@@ -1,4 +1,4 @@
-//! What is known about scenes with joints, and words for them.
+//! Known values of scenes with joints, and their building blocks.
 
 use super::format::{Capsule, Geometry, Scene, SceneBody, SceneShape};
 use super::holds::energies;
@@ -6,22 +6,22 @@ use super::truth::{Observer, Truth};
 use crate::engine::solvers::{DEFAULT, find};
 use crate::engine::world::{Settings, World};
 
-/// A static pin without extent to speak of (m), in the group of what does not collide.
+/// A small static pin at `at` (m), in the group of bodies that do not collide.
 pub(super) fn pin(at: [f64; 2]) -> SceneBody {
     SceneBody { group: -1, ..SceneBody::fixed(at, SceneShape::disc(0.05)) }
 }
 
-/// A horizontal capsule about the origin: half its straight part, and its radius (m).
+/// A horizontal capsule about the origin, by half the length of its straight part and its radius (m).
 pub(super) fn link(half: f64, radius: f64) -> SceneShape {
     SceneShape::new(Geometry::Capsule(Capsule { a: [-half, 0.0], b: [half, 0.0], radius }))
 }
 
-/// The same body, slowed by a tenth per second.
+/// The same body, damped by a tenth per second.
 pub(super) fn damped(body: SceneBody) -> SceneBody {
     SceneBody { linear_damping: 0.1, angular_damping: 0.1, ..body }
 }
 
-/// Root mean square of the gaps of all joints, over all steps from `seconds` on: rigid joints have none.
+/// Root mean square of the gaps of all joints, over all steps from `seconds` on. Rigid joints have none.
 pub(super) fn gaps(scene: &Scene, seconds: f64) -> Truth {
     let from = (seconds / scene.dt).round() as u64;
     let observer = Gaps { from, sum: 0.0, count: 0.0 };
@@ -51,7 +51,8 @@ impl Observer for Gaps {
     }
 }
 
-/// Energy of a motion without losses, at the end: its change, over what it had above the `lowest` potential energy (J).
+/// Change of energy at the end of a motion without losses, as a fraction of the initial energy above the
+/// `lowest` potential energy (J).
 pub(super) fn energy(scene: &Scene, lowest: f64) -> Truth {
     let start = find(DEFAULT).ok().and_then(|solver| {
         let world = scene.build(Settings::new(solver)).ok()?;

@@ -10,7 +10,7 @@ use crate::engine::bodies::BodyKind;
 use crate::engine::joints::{JointKind, Motor, Prismatic, Revolute, Spring, Weld, Wheel};
 use std::f64::consts::{PI, TAU};
 
-/// Box2D's joint grid: discs that do not collide, hinged to the one above and the one on the left.
+/// Box2D's joint grid: discs that do not collide, each hinged to the one above and the one on its left.
 pub(super) const GRID: Entry =
     Entry::new("joint_grid", "a square net of hinged discs, hung by a few", |size| {
         let n = size as usize;
@@ -39,7 +39,7 @@ pub(super) const GRID: Entry =
 pub(super) const VEHICLE: Entry = Entry::new("vehicle", "a car on springs that drives over bumps", |_| {
     let mut bodies = vec![ground_line(60.0)];
     for i in 0..8 {
-        // They stand out by 0.1 to 0.17 m.
+        // The bumps stand out by 0.1 to 0.17 m.
         let x = 4.0 + 3.0 * f64::from(i);
         bodies.push(SceneBody::fixed([x, -0.9 + 0.01 * f64::from(i)], SceneShape::disc(1.0)));
     }
@@ -98,14 +98,15 @@ pub(super) const CRANE: Entry =
     .known(|scene, _| gaps(scene, 0.2))
     .within(|scene, _| Tolerances::standard(scene).truth(0.005, "1 % of a link of half a meter"));
 
-/// Ring: height of its middle, its inner radius (m), and its pieces.
+/// Ring: height of its center, its inner radius (m), and its number of pieces.
 const RING: (f64, f64, u32) = (32.0, 40.0, 360);
 
 /// Speed of the paddle's motor (rad/s).
 const PADDLE: f64 = 5.0;
 
-/// Box2D's spinner: capsules, discs and squares in turn in a ring, where a motor of any torque turns a paddle. Its ring is a chain
-/// of edges; here they are capsules, so that it has an inside and an outside.
+/// Box2D's spinner: a ring with capsules, discs and squares in turn, in which a motor of practically
+/// unlimited torque turns a paddle. Box2D's ring is a chain of edges; here it consists of capsules, so that
+/// it has an inside and an outside.
 pub(super) const SPINNER: Entry =
     Entry::new("spinner", "a ring full of small bodies, stirred by a paddle on a motor", |count| {
         let (middle, inner, pieces) = RING;
@@ -156,7 +157,7 @@ pub(super) const SPINNER: Entry =
     }))])
     .within(|scene, speed| Tolerances::impacts(scene).percent(speed));
 
-/// Box2D's scene for determinism: columns of boxes that lean to and fro, hinged in pairs, come down.
+/// Box2D's scene for determinism: columns of boxes that lean alternately, hinged in pairs, fall over.
 pub(super) const HINGES: Entry =
     Entry::new("falling_hinges", "four columns of boxes, hinged in pairs, that fall over", |rows| {
         // At ±0.1 rad a box is 0.5475 m high.
@@ -173,7 +174,8 @@ pub(super) const HINGES: Entry =
             bodies.push(body.turned(if row % 2 == 0 { -lean } else { lean }));
             if row % 2 == 1 {
                 let (sin, cos) = lean.sin_cos();
-                // From the middle of the upper box to the left upper corner of the lower one, and that in the upper one's frame.
+                // Vector from the center of the upper box to the upper left corner of the lower one;
+                // `anchor_b` is the same in the upper box's frame.
                 let [x, y] = [-half * (cos - sin) - 0.1, half * (cos + sin) - pitch];
                 let hinge = Revolute {
                     anchor_a: [-half, half],

@@ -27,8 +27,8 @@ pub(super) const PAIR: Entry = Entry::new("mass_ratio", "a heavy disc on a disc 
 .holds(&[Demand::Stands, Demand::Rests])
 .within(|scene, load| Tolerances::standard(scene).percent(load));
 
-/// Momentum at rest: the ground carries (1 + R) g. Two discs side by side would
-/// load it as much, so a heavy disc that has sunk by more than a radius is infinitely wrong.
+/// Momentum balance at rest: the ground carries (1 + R) g. Two discs side by side would load it equally, so
+/// the error is infinite if the heavy disc has sunk by more than a radius.
 fn pair_error(view: &View, weight: f64) -> Option<f64> {
     let on_top = view.center(2)[1] - view.center(1)[1] > 0.5;
     let error = ground_load(view)? - weight;

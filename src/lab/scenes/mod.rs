@@ -1,7 +1,7 @@
 //! Scenes: file format, catalog, known values, conditions on a run, and tolerances.
 //!
-//! A new scene is one file here and one row in [`CATALOG`]. Ids such as A5 in the scene files are those of `simpulse
-//! verify`.
+//! A new scene is one file here and one row in [`CATALOG`]. Ids such as A5 in the scene files are those of
+//! `simpulse verify`.
 
 mod arch;
 mod bounce;
@@ -122,31 +122,32 @@ pub struct Entry {
     pub summary: &'static str,
     /// The number after the colon, for scenes that have one.
     pub size: Option<Size>,
-    /// Makes the scene; a size is within its range, and 0 where there is none.
+    /// Builds the scene; the size is within its range, or 0 for scenes without one.
     pub build: fn(u32) -> Scene,
-    /// Makes it from a size and a seed, for scenes with chance in them.
+    /// Builds the scene from a size and a seed, for random scenes.
     pub seeded: Option<fn(u32, u64) -> Scene>,
-    /// The known value of the scene of that size, for a run of its `steps` at its `dt`.
+    /// The known value of a scene of that size, for a run of its `steps` at its `dt`.
     pub truth: Option<fn(&Scene, u32) -> Truth>,
-    /// Properties of a scene that are known without building it, if it may be very large.
+    /// Properties that are known without building the scene, for scenes that may be very large.
     pub outline: Option<fn(u32) -> Outline>,
-    /// Conditions on a run, besides that nothing blows up or passes through static bodies.
+    /// Conditions on a run, in addition to those on every run: nothing blows up or passes through static
+    /// bodies.
     pub demands: &'static [Demand],
     /// Tolerances, for the scene and its reference value (0 if none is known).
     pub tolerances: fn(&Scene, f64) -> Tolerances,
 }
 
-/// Meaning of the size of scenes with one mass on another.
+/// Meaning of the size of scenes in which a heavy body is on a light one.
 pub const MASS_RATIO: &str = "times as heavy";
 
-/// A whole number that a scene is made from.
+/// Size of a scene: a whole number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
-    /// Where none is given.
+    /// Default.
     pub default: u32,
-    /// Least.
+    /// Minimum.
     pub min: u32,
-    /// Greatest.
+    /// Maximum.
     pub max: u32,
     /// The quantity that it counts.
     pub meaning: &'static str,
@@ -155,9 +156,9 @@ pub struct Size {
 /// Properties that follow from the size of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outline {
-    /// Bodies in it.
+    /// Number of bodies.
     pub bodies: usize,
-    /// Its reference value, in the unit that all sizes have.
+    /// Reference value, in the unit that all sizes have in common.
     pub reference: f64,
 }
 
@@ -192,7 +193,7 @@ impl Entry {
         Self { tolerances, ..self }
     }
 
-    /// A scene of this entry, with what is known about a run of its steps at its step.
+    /// A scene of this entry, with its known value and conditions for a run of its `steps` at its `dt`.
     pub fn loaded(&self, mut scene: Scene, size: u32) -> Loaded {
         let truth = self.truth.map(|truth| truth(&scene, size));
         let mut tolerances = (self.tolerances)(&scene, truth.as_ref().map_or(0.0, |t| t.expected));
@@ -203,7 +204,7 @@ impl Entry {
         Loaded { scene, truth, demands: self.demands.to_vec(), tolerances, unchecked: Vec::new() }
     }
 
-    /// The size of this text.
+    /// Parses a size.
     fn parse_size(&self, text: Option<&str>) -> Result<u32, Error> {
         let refuse = |message| Err(Error::invalid(format!("scene '{}'", self.name), message));
         match (self.size, text) {
@@ -220,20 +221,20 @@ impl Entry {
 
 /// A scene of the catalog, and what is known about it.
 pub struct Loaded {
-    /// Ready to build.
+    /// The scene, ready to build.
     pub scene: Scene,
-    /// None where nothing is known.
+    /// Known value; `None` if there is none.
     pub truth: Option<Truth>,
     /// Conditions that a run has to meet.
     pub demands: Vec<Demand>,
-    /// How wrong it may be.
+    /// Limits on the errors of a run.
     pub tolerances: Tolerances,
-    /// Conditions that are not checked, in words: a file need not give any.
+    /// Conditions that are not checked, in words: a file may omit them.
     pub unchecked: Vec<String>,
 }
 
 impl Loaded {
-    /// Whether it is demanded that the scene comes to rest, so that it has to stand for a minute.
+    /// Whether the scene must come to rest, and therefore stand for a minute.
     pub fn rests(&self) -> bool {
         self.demands.iter().any(|d| matches!(d, Demand::Rests))
     }
@@ -241,13 +242,13 @@ impl Loaded {
 
 /// A scene by its name, with its size after a colon: `arch`, `stack`, `stack:40`.
 ///
-/// Errors: a name that is not in [`CATALOG`]; a size that is none, or out of its range.
+/// Errors: a name that is not in [`CATALOG`]; a size that is invalid or out of range.
 pub fn load(name: &str) -> Result<Loaded, Error> {
     load_with(name, None)
 }
 
-/// As [`load`], with a seed for what is random in the scene. The same seed
-/// gives the same scene; a scene without chance in it ignores the seed.
+/// As [`load`], with a seed for random scenes. The same seed gives the same scene; other scenes ignore the
+/// seed.
 pub fn load_with_seed(name: &str, seed: u64) -> Result<Loaded, Error> {
     load_with(name, Some(seed))
 }
@@ -279,28 +280,28 @@ fn load_with(name: &str, seed: Option<u64>) -> Result<Loaded, Error> {
 /// Description of a scene without its bodies.
 #[derive(Clone, Debug)]
 pub struct Description {
-    /// With its size.
+    /// Name, with its size.
     pub name: String,
-    /// How many.
+    /// Number of bodies.
     pub bodies: usize,
-    /// Of a run.
+    /// Number of steps of a run.
     pub steps: u32,
     /// Length of a step (s).
     pub dt: f64,
-    /// m/s²
+    /// Gravity (m/s²).
     pub gravity: [f64; 2],
-    /// The quantity of the reference value, the value, its unit.
+    /// Quantity, value and unit of the reference value.
     pub reference: Option<(&'static str, f64, &'static str)>,
     /// Conditions that a run has to meet.
     pub demands: Vec<Demand>,
-    /// How wrong it may be.
+    /// Limits on the errors of a run.
     pub tolerances: Tolerances,
     /// Conditions that are not checked, in words.
     pub unchecked: Vec<String>,
 }
 
 impl Description {
-    /// Of a scene that is there.
+    /// Describes a scene that is built.
     pub fn of(loaded: &Loaded) -> Self {
         let Loaded { scene, truth, demands, tolerances, unchecked } = loaded;
         Description {
@@ -317,8 +318,8 @@ impl Description {
     }
 }
 
-/// Describes a scene of the catalog. One that may be very large is not made for it: its smallest
-/// sibling says what all sizes have in common, and its [`Outline`] the rest.
+/// Describes a scene of the catalog. A scene that may be very large is not built: its smallest size gives
+/// what all sizes have in common, and its [`Outline`] the rest.
 ///
 /// Errors: as [`load`].
 pub fn describe(name: &str, seed: Option<u64>) -> Result<Description, Error> {

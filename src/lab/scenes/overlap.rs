@@ -1,11 +1,11 @@
-//! C7: boxes that start a quarter deep in each other.
+//! C7: boxes that start overlapping by a quarter.
 
 use super::parts::ground_line;
 use super::tolerance::Tolerances;
 use super::truth::rests_on_ground;
 use super::{Entry, Scene, SceneBody, SceneShape};
 
-/// Wherever they are pushed, once at rest the ground carries their weight.
+/// Wherever the boxes are pushed, the ground carries their weight once they rest.
 pub(super) const RECOVERY: Entry =
     Entry::new("overlap_recovery", "a pyramid of ten boxes that start overlapping by a quarter", |_| {
         let mut bodies = vec![ground_line(40.0)];

@@ -1,4 +1,4 @@
-//! Helpers that scenes are built with.
+//! Helpers for building scenes.
 
 use super::format::*;
 use super::joints::SceneJoint;
@@ -21,7 +21,7 @@ impl Scene {
         }
     }
 
-    /// With these joints.
+    /// The same scene with these joints.
     pub fn joined(self, joints: Vec<SceneJoint>) -> Self {
         Scene { joints, ..self }
     }
@@ -60,7 +60,7 @@ impl SceneBody {
         Self::new(BodyKind::Static, position, shape)
     }
 
-    /// A body that forces move.
+    /// A body that is moved by forces and contacts.
     pub fn dynamic(position: [f64; 2], shape: SceneShape) -> Self {
         Self::new(BodyKind::Dynamic, position, shape)
     }
@@ -133,8 +133,8 @@ pub(super) fn ground_box(half: f64) -> SceneBody {
     SceneBody::fixed([0.0, -1.0], SceneShape::rectangle(half, 1.0))
 }
 
-/// A yard with its floor's middle at height 0: meter blocks from −`half` to `half`, and walls
-/// `height` of them high at both ends. Blocks overlap by 0.1 m, so that nothing slips through.
+/// A yard of 1 m blocks: a floor about height 0 from −`half` to `half`, and walls of `height` blocks at both
+/// ends. Blocks overlap by 0.1 m, so that nothing slips through.
 pub(super) fn yard(half: i32, height: i32) -> SceneBody {
     let (half_width, mut shapes) = (f64::from(half), Vec::new());
     for x in -half..=half {
@@ -148,7 +148,7 @@ pub(super) fn yard(half: i32, height: i32) -> SceneBody {
     SceneBody { shapes, ..SceneBody::fixed([0.0, 0.0], SceneShape::line(1.0)) }
 }
 
-/// Bodies whose center is below the middle of a floor at height 0; NaN counts.
+/// Number of dynamic bodies whose center is below the middle of a floor at height 0; NaN counts.
 pub(super) fn below_floor(view: &View) -> usize {
     let above = |&i: &usize| !view.bodies.is_dynamic(i) || view.center(i)[1] >= 0.0;
     view.bodies.len() - (0..view.bodies.len()).filter(above).count()

@@ -7,7 +7,8 @@ use super::truth::{Truth, Worst, weight};
 use super::{Entry, Scene, SceneBody, SceneJoint, SceneShape};
 use std::f64::consts::FRAC_PI_3;
 
-/// A rod of 1 m and 0.1 m² that hangs from `top` at an angle (rad) from the lowest place, and does not collide.
+/// A rod of 1 m and 0.1 m² that hangs from `top` at an angle (rad) from its lowest position, and does not
+/// collide.
 pub(super) fn rod(top: [f64; 2], angle: f64) -> SceneBody {
     let (sin, cos) = angle.sin_cos();
     let center = [top[0] + 0.5 * sin, top[1] - 0.5 * cos];
@@ -15,7 +16,7 @@ pub(super) fn rod(top: [f64; 2], angle: f64) -> SceneBody {
     SceneBody { group: -1, ..rod }
 }
 
-/// A rod on a pin, released at rest `angle` from the lowest place (rad).
+/// A rod on a pin, released at rest at `angle` from its lowest position (rad).
 pub(super) fn pendulum(name: &str, angle: f64) -> Scene {
     let joint = SceneJoint::revolute(0, 1, [0.0, 0.0], [0.0, 0.5]);
     Scene::new(name, vec![pin([0.0, 0.0]), rod([0.0, 0.0], angle)]).joined(vec![joint])
@@ -29,7 +30,7 @@ pub(super) const PENDULUM: Entry =
     .holds(&[Demand::GainsNoEnergy])
     .within(|scene, _| Tolerances::standard(scene).truth(0.005, "half a percent in a minute"));
 
-/// Two rods, both released 120° from the lowest place.
+/// Two rods, both released 120° from the lowest position.
 pub(super) const DOUBLE: Entry =
     Entry::new("double_pendulum", "two rods on a pin, released 120° from the lowest place", |_| {
         let angle = 2.0 * FRAC_PI_3;
@@ -46,8 +47,8 @@ pub(super) const DOUBLE: Entry =
     .holds(&[Demand::GainsNoEnergy])
     .within(|scene, _| Tolerances::standard(scene).truth(0.01, "A15: 1 % in a minute"));
 
-/// Three cranks of 1 m, parallel at all times, under one coupler: 12 coordinates and 12 rows, of which one is redundant, so
-/// that it swings.
+/// Three cranks of 1 m, parallel at all times, under one coupler: 12 coordinates and 12 rows, one of them
+/// redundant, so that it can swing.
 pub(super) const FOUR_BAR: Entry =
     Entry::new("four_bar", "a coupler on three parallel cranks: closed loops with a redundant row", |_| {
         let angle = FRAC_PI_3;
@@ -72,7 +73,7 @@ pub(super) const FOUR_BAR: Entry =
 /// Length of the cradle's rods (m).
 const CRADLE: f64 = 5.0;
 
-/// Newton's cradle: what the first ball brings, the last one takes.
+/// Newton's cradle: the last ball takes over the motion of the first.
 pub(super) const CRADLE_OF_FIVE: Entry =
     Entry::new("cradle", "Newton's cradle: five balls on rods, e = 1", |_| {
         let mut bodies = vec![SceneBody::fixed([2.0, CRADLE + 1.0], SceneShape::line(2.0))];

@@ -2,7 +2,7 @@
 
 use crate::lab::error::LONGEST_MISSPELT;
 
-/// Longer keys are cut in a place, so that there is room for what is wrong (characters).
+/// Longer keys are cut in a place, to leave room for the message (characters).
 const LONGEST_KEY: usize = 40;
 
 /// One open bracket on the way to a position in the text.
@@ -13,8 +13,8 @@ enum OpenBracket {
     Array { index: usize },
 }
 
-/// The message of a JSON `error` in `text`: place, what is wrong, the offending
-/// number or the nearest known key where there is one, line and column.
+/// The message of a JSON `error` in `text`: place, error, the offending number or the nearest known key if
+/// there is one, line and column.
 pub(super) fn place_at(text: &str, error: &serde_json::Error) -> String {
     let before = &text.as_bytes()[..offset_of(text, error.line(), error.column())];
     let full = error.to_string();
@@ -28,7 +28,7 @@ pub(super) fn place_at(text: &str, error: &serde_json::Error) -> String {
         m if m.starts_with("unknown field") => nearest_key(m),
         _ => String::new(),
     };
-    // Of a missing field the position is behind the bracket of the object that misses it.
+    // For a missing field, the position is after the bracket of the object that lacks it.
     let place = path(&levels_at(before));
     let colon = if place.is_empty() { "" } else { ": " };
     format!("{place}{colon}{message}{hint}{suffix}")
@@ -40,8 +40,8 @@ fn offset_of(text: &str, line: usize, column: usize) -> usize {
     (start + column).min(text.len())
 }
 
-/// The brackets that are open at the end of `text`. The text may end anywhere;
-/// what is malformed only makes the place less exact.
+/// The brackets that are open at the end of `text`. The text may end anywhere; malformed text only makes the
+/// place less exact.
 fn levels_at(text: &[u8]) -> Vec<OpenBracket> {
     let mut levels = Vec::new();
     let mut i = 0;
@@ -98,7 +98,7 @@ fn number_before(text: &str) -> &str {
     &end[end.trim_end_matches(is_number).len()..]
 }
 
-/// Serde says "unknown field `a`, expected one of `b`, `c`"; the nearest of the expected.
+/// The nearest expected key in serde's "unknown field `a`, expected one of `b`, `c`".
 fn nearest_key(message: &str) -> String {
     let mut quoted = message.split('`').skip(1).step_by(2);
     let unknown = quoted.next().unwrap_or_default();

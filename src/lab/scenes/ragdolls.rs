@@ -8,11 +8,12 @@ use super::{Capsule, Entry, Geometry, Scene, SceneBody, SceneJoint, SceneShape};
 use crate::engine::joints::{JointKind, Motor, Revolute, Spring};
 use std::f64::consts::PI;
 
-/// A bone: its parent, height of its middle (m), lower and upper end (m from there), radius (m), height of the hinge to
-/// the parent (m), limits of the angle (π), friction of the hinge (of [`Muscles::friction`]).
+/// A bone: its parent, height of its middle (m), lower and upper end (m from there), radius (m), height of
+/// the hinge to the parent (m), limits of the angle (π), friction of the hinge (as a multiple of
+/// [`Muscles::friction`]).
 type Bone = (usize, f64, [f64; 2], f64, f64, [f64; 2], f64);
 
-/// What moves the hinges of a human.
+/// Friction and springs of a human's hinges.
 #[derive(Clone, Copy)]
 struct Muscles {
     /// Friction of a hinge (N·m).
@@ -20,10 +21,10 @@ struct Muscles {
     spring: Option<Spring>,
 }
 
-/// Solver2D's.
+/// Muscles of Solver2D's human.
 const LIMP: Muscles = Muscles { friction: 0.025, spring: None };
 
-/// Those of Box2D's rain.
+/// Muscles of the humans in Box2D's rain.
 const TENSE: Muscles =
     Muscles { friction: 0.05, spring: Some(Spring { hertz: 5.0, damping_ratio: 0.5, rest: 0.0 }) };
 
@@ -95,17 +96,17 @@ pub(super) const PILE: Entry = Entry::new("ragdolls", "humans that fall into a t
 
 const SEEN: &str = "a centimeter between two bones is seen";
 
-/// Bodies whose center is below `height` (m); NaN counts.
+/// Number of bodies whose center is below `height` (m); NaN counts.
 fn below(view: &View, height: f64) -> usize {
     view.bodies.len() - (0..view.bodies.len()).filter(|&i| view.center(i)[1] >= height).count()
 }
 
-/// Floors, and the distance from one to the next (m).
+/// Number of floors, and the distance from one to the next (m).
 const FLOORS: (u32, f64) = (5, 45.0);
 
-/// Box2D's rain: groups of five humans fall on five floors. There they come one group after the other; here all are in the
-/// air from the start, so that the groups land one after the other: group c on a floor has its feet 2 + 1.5 c m above it, at most
-/// 40 m as there. Its floors are 125 m wide at either side.
+/// Box2D's rain: groups of five humans fall on five floors. In Box2D the groups appear one after the other.
+/// Here all are in the air from the start, at heights from which they land one after the other: group c has
+/// its feet 2 + 1.5 c m above its floor, at most 40 m as in Box2D. Floors extend 125 m to either side.
 pub(super) const RAIN: Entry = Entry::new("rain", "humans that rain on five floors", |columns| {
     let (mut bodies, mut joints) = (vec![], vec![]);
     for row in 0..FLOORS.0 {

@@ -24,10 +24,10 @@ pub(super) const STOP: Entry =
     })
     .within(|scene, way| Tolerances::standard(scene).percent(way));
 
-/// Friction takes µ g h per substep until less than that is left, then all of it:
+/// Friction removes µ g h of the speed per substep until less than that is left, then all of it:
 /// v_j = max(0, v0 − j µ g h). With m = min(n, ⌊v0/(µ g h)⌋) substeps of motion,
-/// x_n = h Σ v_j = h (m v0 − µ g h m(m+1)/2). In the limit v0²/(2 µ g); at
-/// finite h it is shorter by up to v0 h/2.
+/// x_n = h Σ v_j = h (m v0 − µ g h m(m+1)/2). In the limit v0²/(2 µ g); at finite h it is shorter by up to v0
+/// h/2.
 fn slid(view: &View) -> f64 {
     let h = view.h();
     let loss = BOX_FRICTION * G * h;

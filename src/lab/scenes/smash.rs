@@ -25,7 +25,7 @@ pub(super) const SMASH: Entry = Entry::new("smash", "a heavy block flies into 96
     });
     Truth::new("momentum of all bodies at the end", "kg m/s", expected, at_end)
 })
-// The block is heavier than all: what it hits leaves at up to its own speed.
+// The block is much heavier than a box: boxes that it hits leave at up to its own speed.
 .within(|scene, momentum| Tolerances::impacts(scene).percent(momentum));
 
 /// Σ m v (kg m/s)

@@ -1,33 +1,33 @@
 //! Tolerances of a scene: limits on errors, with their reasons.
 //!
-//! They follow from what is visible or what no solver can avoid, not from what some solver reaches. It is a valid
-//! result that no solver is within them.
+//! They follow from what is visible or what no solver can avoid, not from what some solver reaches. That no
+//! solver meets them is a valid result.
 
 use super::format::Scene;
 use crate::engine::bodies::{BodyDef, BodyKind};
 use crate::engine::params::LINEAR_SLOP;
 use crate::lab::interned::{self, Name};
 
-/// The most that an error may be in a plausible run.
+/// Limit on an error in a plausible run.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Tolerance {
-    /// In the unit of the error.
+    /// The limit, in the unit of the error.
     pub value: f64,
-    /// Why this much.
+    /// Reason for the limit.
     #[serde(deserialize_with = "interned::read")]
     pub reason: Name,
-    /// Whether it is what no solver can avoid, so that it is the same at every accuracy.
+    /// Whether no solver can avoid an error of this size; the limit is then the same at every accuracy.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub fixed: bool,
 }
 
 impl Tolerance {
-    /// One that shrinks with the accuracy.
+    /// A tolerance that shrinks with the accuracy.
     pub const fn new(value: f64, reason: &'static str) -> Self {
         Tolerance { value, reason, fixed: false }
     }
 
-    /// At an accuracy.
+    /// The limit at an accuracy.
     pub fn at(&self, accuracy: Accuracy) -> f64 {
         if self.fixed { self.value } else { self.value * accuracy.share() }
     }
@@ -46,10 +46,10 @@ pub enum Accuracy {
 }
 
 impl Accuracy {
-    /// From the loosest on.
+    /// Every level, loosest first.
     pub const ALL: [Accuracy; 3] = [Accuracy::Plausible, Accuracy::Tight, Accuracy::Exact];
 
-    /// For tables.
+    /// Word for tables.
     pub fn word(self) -> &'static str {
         match self {
             Accuracy::Plausible => "plausible",
@@ -58,7 +58,7 @@ impl Accuracy {
         }
     }
 
-    /// Its tolerances in those of [`Accuracy::Plausible`] (1).
+    /// Its tolerances as a fraction of those of [`Accuracy::Plausible`] (1).
     pub fn share(self) -> f64 {
         match self {
             Accuracy::Plausible => 1.0,
@@ -73,27 +73,27 @@ impl Accuracy {
 pub struct Tolerances {
     /// Penetration (m), see [`Errors::penetration`](crate::lab::metrics::Errors::penetration).
     pub penetration: Tolerance,
-    /// Contact-law residual, root mean square, in the weight of the lighter body × step (1).
+    /// Root mean square of the contact-law residual, as a fraction of the lighter body's weight × step (1).
     pub residual: Tolerance,
-    /// Distance to what is known about the scene, in its unit; none where nothing is known.
+    /// Distance to the known value, in its unit; `None` if nothing is known.
     #[serde(rename = "reference")]
     pub truth: Option<Tolerance>,
-    /// Speed that is left at the end (m/s); none where nothing has to come to rest.
+    /// Speed that remains at the end (m/s); `None` if nothing must come to rest.
     #[serde(rename = "rest_speed")]
     pub rest: Option<Tolerance>,
 }
 
-/// Tolerances that take the place of a scene's own.
+/// Tolerances that override a scene's own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct GivenTolerances {
-    /// m
+    /// Penetration (m).
     pub penetration: Option<f64>,
     /// See [`Tolerances::residual`].
     pub residual: Option<f64>,
-    /// In the unit of each scene's truth.
+    /// Distance to the known value, in the unit of each scene.
     #[serde(rename = "reference")]
     pub truth: Option<f64>,
-    /// m/s
+    /// Speed that remains at the end (m/s).
     #[serde(rename = "rest_speed")]
     pub rest: Option<f64>,
 }
@@ -101,11 +101,11 @@ pub struct GivenTolerances {
 /// Visible overlap, relative to the size of a body (1): 1 cm at 1 m.
 const SEEN: f64 = 0.01;
 
-/// Speed that is visible at rest, in body sizes per second: half a centimeter at a meter, a twelfth of a
-/// millimeter in each of sixty pictures.
+/// Speed that is visible at rest, in body sizes per second: half a centimeter per second at a meter, which is
+/// a twelfth of a millimeter in each of sixty frames.
 const SEEN_MOVING: f64 = 0.005;
 
-/// Size of the bodies that move: the median of their mean extents (m), 1 where nothing moves.
+/// Size of the moving bodies: the median of their mean extents (m); 1 if nothing moves.
 pub fn size(scene: &Scene) -> f64 {
     let bodies = scene.body_defs().unwrap_or_default();
     let extent = |body: &BodyDef| {
@@ -128,7 +128,7 @@ pub fn size(scene: &Scene) -> f64 {
 }
 
 impl Tolerances {
-    /// Those of bodies that rest or slide; nothing is known.
+    /// Tolerances for bodies that rest or slide, without a known value.
     pub fn standard(scene: &Scene) -> Self {
         Tolerances {
             penetration: Tolerance::new(SEEN * size(scene), "1 % of a body starts to be visible"),
@@ -138,11 +138,11 @@ impl Tolerances {
         }
     }
 
-    /// Those of a scene whose bodies hit each other.
+    /// Tolerances for a scene whose bodies hit each other.
     ///
-    /// The impulse of an impact at v is v/(g Δt) times that of the weight, 60 times at 10 m/s: a residual
-    /// of 1 is some hundredths of it. How deep bodies fly into each other before they are a contact is no
-    /// solver's error, and not in the penetration.
+    /// The impulse of an impact at v is v/(g Δt) times that of the weight: 60 times at 10 m/s. A residual of
+    /// 1 is then a few hundredths of it. The depth at which bodies overlap before they have a contact is not
+    /// a solver's error, and not part of the penetration.
     pub fn impacts(scene: &Scene) -> Self {
         let reason =
             "one body weight: impacts reach dozens of weights, so this is a few percent of an impact";
@@ -154,28 +154,29 @@ impl Tolerances {
         Tolerance::new(SEEN_MOVING * size(scene), "0.5 % of a body per second starts to be visible")
     }
 
-    /// The same, with this for the deepest penetration (m).
+    /// The same, with this limit on the penetration (m).
     pub fn penetration(self, value: f64, reason: &'static str) -> Self {
         Self { penetration: Tolerance::new(value, reason), ..self }
     }
 
-    /// The same, with what no solver can avoid: a residual, and a distance to what is known.
+    /// The same, with limits that no solver can avoid: on the residual, and on the distance to the known
+    /// value.
     pub fn fixed(self, residual: (f64, &'static str), truth: (f64, &'static str)) -> Self {
         let fixed = |(value, reason)| Tolerance { value, reason, fixed: true };
         Self { residual: fixed(residual), truth: Some(fixed(truth)), ..self }
     }
 
-    /// The same, with this for what is known.
+    /// The same, with this limit on the distance to the known value.
     pub fn truth(self, value: f64, reason: &'static str) -> Self {
         Self { truth: Some(Tolerance::new(value, reason)), ..self }
     }
 
-    /// A hundredth of a truth of this size.
+    /// The same, with a hundredth of a known value of this size.
     pub fn percent(self, size: f64) -> Self {
         self.truth(0.01 * size.abs(), "1 % of the expected value")
     }
 
-    /// A slop in each of so many joints on top of each other.
+    /// The same, with a slop in each of `count` joints on top of each other.
     pub fn joints(self, count: f64) -> Self {
         self.truth(f64::from(LINEAR_SLOP) * count, "one slop per joint up to the top")
     }

@@ -1,8 +1,8 @@
 //! Known values, and observers that measure the distance of a world from them.
 //!
-//! An observer sees only the world after each step, not the solver or its time. It reads the `f32` state and computes
-//! in `f64`. If the exact result of a semi-implicit Euler scheme with n substeps is known, the observer compares with
-//! that, so that a correct solver's error is rounding, not discretization.
+//! An observer sees only the world after each step, not the solver or its time. It reads the `f32` state and
+//! computes in `f64`. If the exact result of a semi-implicit Euler scheme with n substeps is known, the
+//! observer compares with that, so that the error of a correct solver is rounding, not discretization.
 
 use super::expect::Measure;
 use super::format::Scene;
@@ -12,25 +12,25 @@ use crate::engine::world::World;
 
 /// Measures one number along a run.
 pub trait Observer {
-    /// Looks at `world` after one more step.
+    /// Observes `world` after one more step.
     fn observe(&mut self, world: &World);
 
-    /// Distance to the truth so far; none while there is nothing to compare yet,
-    /// infinite after a number that is not one, or where the truth has become unreachable.
+    /// Distance to the known value so far. `None` while there is nothing to compare; infinite after a NaN, or
+    /// once the value has become unreachable.
     fn error(&self) -> Option<f64>;
 }
 
-/// Something known about a scene, and who measures it.
+/// A known value of a scene, and its observer.
 pub struct Truth {
     /// The measured quantity.
     pub quantity: &'static str,
     /// Unit of `expected` and of the error.
     pub unit: &'static str,
-    /// The value that the exact rigid bodies have (in the limit of small steps).
+    /// The value for exact rigid bodies (in the limit of small steps).
     pub expected: f64,
-    /// Its name in scene files, with its body; none if only the catalog has it.
+    /// Its name in scene files, with its body; `None` if only the catalog has it.
     pub measure: Option<(Measure, Option<usize>)>,
-    /// Its error is the distance to the truth, in `unit`.
+    /// Measures the distance to the known value, in `unit`.
     pub observer: Box<dyn Observer>,
 }
 
@@ -56,7 +56,7 @@ pub(super) struct View<'a> {
     pub dt: f64,
     /// Substeps per step.
     pub substeps: u32,
-    /// Whether `Contact::step_impulse` is kept.
+    /// Whether `Contact::step_impulse` is recorded.
     pub impulses: bool,
 }
 
@@ -107,15 +107,15 @@ impl<'a> View<'a> {
     }
 }
 
-/// The largest of distances and 0. A NaN, which `f64::max` would drop, is infinite.
+/// The largest of the distances and 0. NaN, which `f64::max` would drop, counts as infinite.
 pub(super) fn largest(distances: impl IntoIterator<Item = f64>) -> f64 {
     distances.into_iter().fold(0.0, |worst, d| if d.is_nan() { f64::INFINITY } else { worst.max(d) })
 }
 
-/// A measurement of one view: the distance to the truth, if it can be told.
+/// Distance of one view to the known value, if it can be computed.
 pub(super) type TruthDistance = Box<dyn FnMut(&View) -> Option<f64>>;
 
-/// The worst distance to the truth over all steps from `from` on.
+/// The worst distance to the known value over all steps from `from` on.
 pub(super) struct Worst {
     from: u64,
     distance: TruthDistance,
@@ -123,18 +123,18 @@ pub(super) struct Worst {
 }
 
 impl Worst {
-    /// Looks at every step from number `from` (the first is 1) on.
+    /// Observes every step from number `from` (the first is 1) on.
     pub fn from_step(from: u64, distance: impl FnMut(&View) -> Option<f64> + 'static) -> Self {
         Self { from, distance: Box::new(distance), worst: None }
     }
 
-    /// Looks at the last second of `scene`, or at all of it if it is shorter.
+    /// Observes the last second of `scene`, or all of it if it is shorter.
     pub fn last_second(scene: &Scene, distance: impl FnMut(&View) -> Option<f64> + 'static) -> Self {
         let second = (1.0 / scene.dt).round() as u64;
         Self::from_step(u64::from(scene.steps).saturating_sub(second) + 1, distance)
     }
 
-    /// Looks at time `t` (s) and later.
+    /// Observes time `t` (s) and later.
     pub fn from_time(scene: &Scene, t: f64, distance: impl FnMut(&View) -> Option<f64> + 'static) -> Self {
         Self::from_step((t / scene.dt).round() as u64, distance)
     }
@@ -162,9 +162,8 @@ impl Observer for Worst {
 /// Upward load on all static bodies over the last step (N): the impulse that
 /// reaches dynamic bodies through contacts with them, against gravity.
 ///
-/// In a contact with a static body, that body is a and the normal points from it.
-/// Friction counts nothing where static surfaces under load are horizontal, which
-/// is so in every scene that uses this.
+/// In a contact with a static body, that body is a and the normal points away from it. Friction does not
+/// contribute, because static surfaces under load are horizontal in every scene that uses this.
 pub(super) fn ground_load(view: &View) -> Option<f64> {
     if !view.impulses {
         return None;
@@ -196,8 +195,8 @@ pub(super) fn start_centers(scene: &Scene) -> Vec<[f64; 2]> {
     scene.body_defs().unwrap_or_default().iter().map(center).collect()
 }
 
-/// The sum rule of a pile at rest: momentum does not change, so the ground
-/// carries the weight, however the pile shares it out.
+/// The sum rule of a pile at rest: momentum does not change, so the ground carries the weight, however it is
+/// distributed within the pile.
 pub(super) fn rests_on_ground(scene: &Scene) -> Truth {
     load_on_ground(scene, weight(scene))
 }
@@ -216,8 +215,8 @@ pub(super) fn rests_at(scene: &Scene, body: usize, height: f64) -> Truth {
     Truth { measure: Some((Measure::RestingHeight, Some(body))), ..truth }
 }
 
-/// A structure that stands: nothing falls. The error is the greatest drop of any
-/// dynamic body's center below its start, over the whole run.
+/// A structure that stands: nothing falls. The error is the largest drop of any dynamic body's center below
+/// its start, over the whole run.
 pub(super) fn stands(scene: &Scene) -> Truth {
     greatest_drop(scene, 0.0)
 }
@@ -277,7 +276,7 @@ mod tests {
         let (mut x, mut v) = (0.0, 0.0);
         for step in 0..50 {
             let view = by_hand::view(&none, step);
-            // Sums of multiples of 2⁻¹⁶ and their exact products: no rounding to allow for but one.
+            // Sums of multiples of 2⁻¹⁶ and their exact products: only one rounding.
             assert!((view.accelerated(2.0) - x).abs() <= 1e-15, "step {step}");
             for _ in 0..4 {
                 v += 2.0 * view.h();

@@ -6,7 +6,7 @@ use super::truth::{Truth, View, Worst};
 use super::{Entry, Scene, SceneBody, SceneShape};
 use crate::engine::bodies::BodyKind;
 
-/// From the drum's center to the middle of its walls (m); they are 1 m thick.
+/// Distance from the drum's center to the middle of its walls (m), which are 1 m thick.
 const REACH: f64 = 10.0;
 
 pub(super) const TUMBLER: Entry = Entry::new("tumbler", "2025 boxes in a turning square drum", |_| {
@@ -31,10 +31,10 @@ pub(super) const TUMBLER: Entry = Entry::new("tumbler", "2025 boxes in a turning
     Truth::new("boxes outside the drum at the end", "bodies", 0.0, outside)
 })
 .holds(&[Demand::Contains(Outside(escaped))])
-// Across the drum.
+// Boxes fall across the drum.
 .within(|scene, _| Tolerances::impacts(scene).truth(0.5, "none"));
 
-/// Bodies whose center is beyond the middle of a wall of the drum, which is body 0; NaN counts.
+/// Number of bodies whose center is beyond the middle of a wall of the drum, which is body 0; NaN counts.
 fn escaped(view: &View) -> usize {
     let [x, y] = view.center(0);
     let (cos, sin) = (f64::from(view.bodies.rotation_cos[0]), f64::from(view.bodies.rotation_sin[0]));

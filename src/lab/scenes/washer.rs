@@ -34,10 +34,11 @@ pub(super) const WASHER: Entry = Entry::new("washer", "8100 boxes in a turning d
     Truth::new("boxes outside the drum at the end", "bodies", 0.0, outside)
 })
 .holds(&[Demand::Contains(Outside(escaped))])
-// Across the drum.
+// Boxes fall across the drum.
 .within(|scene, _| Tolerances::impacts(scene).truth(0.5, "none"));
 
-/// The piece of a ring from 10 `index` to 10 (`index` + 1) degrees, `wider` degrees more on both sides.
+/// The piece of a ring from 10 `index` to 10 (`index` + 1) degrees, extended by `wider` degrees on both
+/// sides.
 fn wedge(inner: f64, outer: f64, index: u32, wider: f64) -> SceneShape {
     let at = |radius: f64, degrees: f64| {
         let (sin, cos) = degrees.to_radians().sin_cos();
@@ -48,7 +49,7 @@ fn wedge(inner: f64, outer: f64, index: u32, wider: f64) -> SceneShape {
     SceneShape::polygon(vec![at(inner, from), at(outer, from), at(outer, to), at(inner, to)])
 }
 
-/// Bodies whose center is in or beyond the wall of the drum, which is body 0; NaN counts.
+/// Number of bodies whose center is in or beyond the wall of the drum, which is body 0; NaN counts.
 fn escaped(view: &View) -> usize {
     let [x, y] = view.center(0);
     let inside = |i: &usize| {

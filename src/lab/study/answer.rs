@@ -1,29 +1,30 @@
-//! What to use on a scene: the cheapest setting that holds and keeps the scene's tolerances.
+//! Recommended settings for a scene: the cheapest one that holds and meets the scene's tolerances.
 
 use super::Record;
 use super::compare::compare;
 use crate::lab::scenes::tolerance::Accuracy;
 use std::cmp::Ordering;
 
-/// The settings of a scene that are worth naming. A setting is a solver, an order and a budget, at
-/// its fastest lane width.
+/// The recommendable settings of a scene. A setting is a solver, an order and a budget, at its fastest lane
+/// width.
 #[derive(Clone, Debug)]
 pub struct Answer<'a> {
     /// Name of the scene.
     pub scene: &'a str,
-    /// Those that hold and keep every tolerance: the cheapest, then the others by their time.
+    /// Settings that hold and meet every tolerance: the cheapest first, then the others by time.
     pub good: Vec<&'a Record>,
-    /// Of those that hold and do not keep them, the one nearest to it; none if nothing holds.
+    /// Of the settings that hold but miss a tolerance, the one with the smallest excess. `None` if no such
+    /// setting exists.
     pub nearest: Option<&'a Record>,
 }
 
 impl<'a> Answer<'a> {
-    /// Of the records of one scene for plausible runs; none without any.
+    /// From the records of one scene, for plausible runs. `None` if there are no records.
     pub fn of(records: &'a [Record]) -> Option<Answer<'a>> {
         Self::at(records, Accuracy::Plausible)
     }
 
-    /// Of the records of one scene; none without any.
+    /// From the records of one scene. `None` if there are no records.
     pub fn at(records: &'a [Record], accuracy: Accuracy) -> Option<Answer<'a>> {
         let scene = &records.first()?.scene;
         let timed: Vec<&Record> = records.iter().filter(|r| r.sample.is_some()).collect();
@@ -35,7 +36,8 @@ impl<'a> Answer<'a> {
                 good.push(record);
             }
         }
-        // By blocks of the same rounds another one may be faster than the one of the least cost.
+        // Compared by blocks of the same rounds, another setting may be faster than the one with the least
+        // cost.
         let faster = |a: &Record, b: &Record| order(a, b).is_lt();
         let best = (0..good.len()).reduce(|best, i| if faster(good[i], good[best]) { i } else { best });
         if let Some(best) = best {
@@ -50,12 +52,13 @@ impl<'a> Answer<'a> {
         Some(Answer { scene, good, nearest })
     }
 
-    /// Those that would be named and were never run on: the cheapest, and the cheapest of another solver.
+    /// The two settings that would be named, if they have no extended run yet: the cheapest, and the cheapest
+    /// of another solver.
     pub fn untried(&self) -> impl Iterator<Item = &'a Record> {
         [self.best(), self.runner_up()].into_iter().flatten().filter(|r| r.later.is_none())
     }
 
-    /// The cheapest of each solver.
+    /// The cheapest good setting of each solver.
     pub fn of_each_solver(&self) -> Vec<&'a Record> {
         let mut first: Vec<&Record> = Vec::new();
         for record in &self.good {
@@ -66,18 +69,18 @@ impl<'a> Answer<'a> {
         first
     }
 
-    /// The cheapest, if any is good enough.
+    /// The cheapest good setting, if there is one.
     pub fn best(&self) -> Option<&'a Record> {
         self.good.first().copied()
     }
 
-    /// The cheapest of the other solvers.
+    /// The cheapest good setting of any other solver.
     pub fn runner_up(&self) -> Option<&'a Record> {
         let best = self.best()?;
         self.good.iter().copied().find(|r| r.solver != best.solver)
     }
 
-    /// The other solvers that are as cheap as far as can be told, the fastest first.
+    /// The other solvers with a setting that ties with the cheapest one, the fastest first.
     pub fn tied_solvers(&self) -> Vec<&'static str> {
         let mut names: Vec<&'static str> = self.best().iter().map(|best| best.solver).collect();
         for record in self.tied() {
@@ -88,19 +91,19 @@ impl<'a> Answer<'a> {
         names.into_iter().skip(1).collect()
     }
 
-    /// Those that are as cheap as far as can be told, without the cheapest itself.
+    /// Settings whose cost ties with that of the cheapest one, without that one.
     pub fn tied(&self) -> impl Iterator<Item = &'a Record> {
         let best = self.best();
         self.good.iter().skip(1).copied().filter(move |r| best.is_some_and(|best| order(r, best).is_eq()))
     }
 }
 
-/// Which of two records is faster, if that can be told.
+/// Which of two records is faster; `Equal` if it is too close to call.
 pub fn order(a: &Record, b: &Record) -> Ordering {
     a.sample.as_ref().zip(b.sample.as_ref()).map_or(Ordering::Equal, |(a, b)| compare(a, b))
 }
 
-/// Whether two records differ in their lane width at most.
+/// Whether two records differ at most in their lane width.
 pub fn same(a: &Record, b: &Record) -> bool {
     a.setting() == b.setting()
 }
@@ -112,7 +115,7 @@ mod tests {
 
     #[test]
     fn each_accuracy_has_its_own_cheapest() {
-        // 10, 1 and 0.1 mm are allowed.
+        // The tolerances are 10, 1 and 0.1 mm.
         let records = [record(8, 1, 5.0, 9e-3), record(8, 2, 10.0, 9e-4), record(8, 4, 20.0, 2e-4)];
         let best = Accuracy::ALL.map(|a| Answer::at(&records, a).unwrap().best().map(|r| r.budget.substeps));
         assert_eq!(best, [Some(1), Some(2), None]);
@@ -138,7 +141,7 @@ mod tests {
 
     #[test]
     fn blocks_decide_before_medians_do() {
-        // Taken in the same rounds, the second is always 10 % faster; the first left out the slow ones.
+        // In common rounds, the second setting is always 10 % faster; the first one left out the slow rounds.
         let with = |substeps: u32, blocks: Vec<f64>| {
             let mut own = record(8, substeps, 0.0, 1e-3);
             own.sample = Some(crate::lab::study::interleave::tests::sample(vec![blocks]));
@@ -156,7 +159,7 @@ mod tests {
 
     #[test]
     fn the_cheapest_that_holds_within_tolerance_is_named() {
-        // 10 mm are allowed.
+        // The tolerance is 10 mm.
         let records = [
             record(8, 1, 5.0, 11e-3),
             fell(8, 2, 1.0, 0.0),
@@ -168,7 +171,7 @@ mod tests {
         let answer = Answer::of(&records).unwrap();
         let of = |r: Option<&Record>| r.map(|r| (r.lanes, r.budget.substeps));
         assert_eq!((of(answer.best()), of(answer.good.get(1).copied())), (Some((8, 4)), Some((8, 8))));
-        // Nothing else of another solver is good enough.
+        // No other solver has a good setting.
         assert!(answer.runner_up().is_none());
         assert_eq!(of(answer.nearest), Some((8, 1)));
         let none = Answer::of(&records[1..2]).unwrap();

@@ -1,14 +1,14 @@
-//! Which budgets a study tries, and which are impossible.
+//! Budgets that a study tries, and checks for impossible budgets.
 
 use crate::engine::constraints::Impacts;
 use crate::engine::params::Budget;
 use crate::engine::solvers::{VARIANTS, Variant};
 use crate::lab::error::Error;
 
-/// Most that any field of a budget may be: a typo should not run for a year.
+/// Upper limit of every field of a budget, so that a typo does not run for a year.
 pub const LARGEST: u32 = 10_000;
 
-/// Values to try for each field of a [`Budget`]; where a list is empty, the solver's own.
+/// Values to try for each field of a [`Budget`]. An empty list stands for the solver's own value.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct BudgetGrid {
     /// [`Budget::substeps`]
@@ -22,8 +22,8 @@ pub struct BudgetGrid {
 }
 
 impl BudgetGrid {
-    /// Every combination for `variant`, without those that differ only in what it ignores.
-    /// An empty grid gives half the solver's standard budget, that budget, and its double.
+    /// Every combination for `variant`. Combinations that differ only in fields that the solver ignores count
+    /// once. An empty grid gives half, once and twice the solver's standard budget.
     pub fn budgets(&self, variant: &Variant) -> Result<Vec<Budget>, Error> {
         if *self == BudgetGrid::default() {
             return Ok(halved_and_doubled(variant).to_vec());
@@ -56,7 +56,7 @@ impl BudgetGrid {
     }
 }
 
-/// Scales substeps where the solver takes several, else its sweeps.
+/// Scales the substeps if the solver takes several, otherwise its sweeps.
 fn halved_and_doubled(variant: &Variant) -> [Budget; 3] {
     let standard = variant.budget;
     [(1, 2), (1, 1), (2, 1)].map(|(times, over)| {
@@ -73,8 +73,8 @@ fn halved_and_doubled(variant: &Variant) -> [Budget; 3] {
     })
 }
 
-/// Refuses sweeps that none of `solvers` makes, and names the solvers that do. `option` is
-/// `velocity-iterations` or its like.
+/// Rejects a kind of sweep that none of `solvers` makes, and names the solvers that do. `option` is
+/// `velocity-iterations` or similar.
 pub fn check_used(option: &str, solvers: &[&'static Variant]) -> Result<(), Error> {
     let uses = |v: &Variant| match option {
         "velocity-iterations" => v.uses.velocity,
@@ -95,7 +95,7 @@ pub fn check_used(option: &str, solvers: &[&'static Variant]) -> Result<(), Erro
     Err(Error::invalid(format!("--{option}"), message))
 }
 
-/// Refuses a budget that `variant` cannot work with.
+/// Rejects a budget that `variant` cannot run with.
 pub fn check(budget: &Budget, variant: &Variant) -> Result<(), Error> {
     let fields = [
         ("substeps", budget.substeps, true),
@@ -114,7 +114,7 @@ pub fn check(budget: &Budget, variant: &Variant) -> Result<(), Error> {
     Ok(())
 }
 
-/// A budget in few letters, with the fields that `variant` reads: `4 sub · 1 vel · 1 rel`.
+/// Short text of a budget, with the fields that `variant` uses: `4 sub · 1 vel · 1 rel`.
 pub fn brief(budget: &Budget, variant: &Variant) -> String {
     let mut text = format!("{} sub", budget.substeps);
     let fields = [
@@ -130,7 +130,7 @@ pub fn brief(budget: &Budget, variant: &Variant) -> String {
     text
 }
 
-/// The same with the treatment of impacts, where that is not the solver's own.
+/// Appends the treatment of impacts, unless it is the solver's own.
 pub fn with_impacts(text: String, impacts: Impacts) -> String {
     match impacts {
         Impacts::Own => text,

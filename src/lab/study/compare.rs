@@ -1,41 +1,44 @@
 //! Decides which of two settings is faster, or that they tie.
 //!
-//! Each block of one setting is paired with the other's block of the same round. The median of the ratios has an
-//! interval whatever their distribution (Thompson 1936, Savur 1937): of n pairs, the k-th smallest and the k-th
-//! largest ratio have the true median between them unless fewer than k of n fair coins fall on one side. An
-//! interruption is one ratio among many, and a clock that drifts is in both halves of a pair. A ratio of 1 within the
-//! interval is a tie, and so is a negligible difference.
+//! Each block of one setting is paired with the other's block of the same round. The median of the ratios has
+//! a confidence interval for any distribution (Thompson 1936, Savur 1937): of n pairs, the true median lies
+//! between the k-th smallest and the k-th largest ratio unless fewer than k of n fair coins fall on one side.
+//! An interruption affects one ratio among many, and a drifting clock affects both halves of a pair. If the
+//! interval contains 1, the settings tie. A negligible difference is a tie, too.
 
 use super::sample::{Sample, median};
 use std::cmp::Ordering;
 
-/// Times closer than this share are a tie (1): code that moved in memory changes them as much.
+/// Times that differ by less than this fraction are a tie (1): moving code in memory changes them as much.
 pub const TIE: f64 = 0.03;
 
-/// Means that are further above their medians than another's by this share count (1).
+/// Spikes count if the ratio of mean to median of one setting exceeds that of the other by more than this
+/// fraction (1).
 const SPIKES: f64 = 0.1;
 
-/// How often an interval may miss the true median. A study compares dozens of settings, and the
-/// fastest of them is taken: at 5 % some would win by luck.
+/// Probability that an interval misses the true median. A study compares dozens of settings and takes the
+/// fastest one: at 5 % some would win by luck.
 const MISS: f64 = 1e-3;
 
-/// The quantile of the normal distribution that leaves out half of [`MISS`].
+/// Quantile of the normal distribution with half of [`MISS`] beyond it.
 const Z: f64 = 3.291;
 
 /// The time of one setting ÷ that of another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ratio {
-    /// Median over the pairs of blocks, or of the means where spikes differ.
+    /// Median over the pairs of blocks, scaled by the ratio of mean to median if spikes differ.
     pub median: f64,
-    /// Interval of the true median; without bounds where there are too few pairs.
+    /// Confidence interval of the true median; unbounded if there are too few pairs.
     pub interval: [f64; 2],
-    /// Distance from 1 up to which it is a tie (1): [`TIE`], and as much more as the thread had to wait.
+    /// Distance from 1 up to which the ratio is a tie (1): [`TIE`] plus the fraction of time in which a
+    /// thread waited.
     pub tie: f64,
 }
 
 impl Ratio {
-    /// Of `one` in times `other`; none without a pair of blocks. Spikes are in few blocks, so that the median
-    /// does not see them: where one of the two has more of them by a margin, the ratio is that of the means.
+    /// Time of `one` ÷ time of `other`; `None` without a pair of blocks. Spikes occur in few blocks, so the
+    /// median misses them. If one of the two has clearly more spikes, the ratio is therefore that of the
+    /// means.
     pub fn of(one: &Sample, other: &Sample) -> Option<Ratio> {
         let pairs = one.blocks_ns.iter().flatten().zip(other.blocks_ns.iter().flatten());
         let mut ratios: Vec<f64> = pairs.map(|(a, b)| a / b).filter(|r| r.is_finite()).collect();
@@ -53,14 +56,14 @@ impl Ratio {
         })
     }
 
-    /// Whether the two are alike as far as can be told.
+    /// Whether the difference is too small to call.
     pub fn is_tie(&self) -> bool {
         let [low, high] = self.interval;
         (low <= 1.0 && 1.0 <= high) || (self.median.ln()).abs() <= self.tie.ln_1p()
     }
 }
 
-/// Whether `one` is faster ([`Ordering::Less`]) or slower than `other`, or tied with it.
+/// Whether `one` is faster ([`Ordering::Less`]) or slower than `other`, or ties with it.
 pub fn compare(one: &Sample, other: &Sample) -> Ordering {
     match Ratio::of(one, other) {
         Some(ratio) if !ratio.is_tie() => ratio.median.total_cmp(&1.0),
@@ -68,11 +71,11 @@ pub fn compare(one: &Sample, other: &Sample) -> Ordering {
     }
 }
 
-/// The largest k such that fewer than k of `n` fair coins fall on one side, or on the other, with a
-/// probability of [`MISS`] at most.
+/// The largest k for which fewer than k of `n` fair coins fall on one side or the other with a probability of
+/// at most [`MISS`].
 fn rank(n: usize) -> usize {
     if n > 500 {
-        // √n/2 is the deviation of the number; ½ for the step from one number to the next.
+        // √n/2 is the standard deviation of the count; ½ corrects for its discrete steps.
         return (0.5 * (n as f64 - Z * (n as f64).sqrt())) as usize;
     }
     let (mut chance, mut below) = (0.5_f64.powi(n as i32), 0.0);
@@ -96,11 +99,11 @@ mod tests {
 
     #[test]
     fn ranks_are_those_of_tables() {
-        // Of 11 coins all fall alike with 2/2048 < 0.1 %, of 10 with 2/1024.
+        // All of 11 coins fall alike with the probability 2/2048 < 0.1 %, all of 10 with 2/1024.
         assert_eq!([rank(0), rank(10), rank(11)], [0, 0, 1]);
-        // Tables of the sign test at 0.1 %: at most 2 of 20, 13 of 50, 33 of 100; k is one more.
+        // From tables of the sign test at 0.1 %: at most 2 of 20, 13 of 50, 33 of 100; k is one more.
         assert_eq!([rank(20), rank(50), rank(100)], [3, 14, 34]);
-        // The approximation carries on.
+        // The approximation joins without a jump.
         assert!(rank(501).abs_diff(rank(500)) <= 1);
     }
 
@@ -125,7 +128,7 @@ mod tests {
         };
         let (calm, spiky) = (sample(vec![pass(10.0, 10.0); 3]), sample(vec![pass(8.0, 200.0); 3]));
         assert_eq!(compare(&spiky, &calm), Ordering::Greater);
-        // Seen once, it is the machine's.
+        // A spike in a single pass is attributed to the machine.
         let once = sample(vec![pass(8.0, 200.0), pass(8.0, 8.0), pass(8.0, 8.0)]);
         assert_eq!(compare(&once, &calm), Ordering::Less);
         let waiting = Sample { waited: 0.3, ..once };
@@ -135,17 +138,17 @@ mod tests {
     #[test]
     fn only_blocks_of_the_same_round_are_paired() {
         let nan = f64::NAN;
-        // The second pass was the other one's alone, and of another time of day.
+        // In the second pass only the other one was timed, at another speed of the machine.
         let one = sample(vec![vec![10.0; 9], vec![nan; 9]]);
         let other = sample(vec![vec![20.0; 9], vec![5.0; 9]]);
         assert_eq!(Ratio::of(&one, &other).map(|r| r.median), Some(0.5));
     }
 
-    /// How fast the machine is (1) after a share of the study.
+    /// Speed of the machine (1) as a function of the elapsed fraction of the study.
     type Weather = fn(f64) -> f64;
 
-    /// Samples of settings that cost this much (ns), on a clock of our own: `noise` is the relative
-    /// width of the scatter of a block, and one block in twenty is interrupted.
+    /// Samples of settings with these costs (ns), on a simulated clock. `noise` is the relative scatter of a
+    /// block, and one block in twenty is interrupted.
     fn study(costs: &[f64], weather: Weather, noise: f64, seed: u64) -> Vec<Sample> {
         const ROUNDS: usize = 60;
         let mut random = Pcg64::seed_from_u64(seed);
@@ -167,11 +170,11 @@ mod tests {
     }
 
     const CALM: Weather = |_| 1.0;
-    /// 30 % slower in the end than at the start.
+    /// 30 % slower at the end than at the start.
     const DRIFT: Weather = |t| 1.0 + 0.3 * t;
-    /// 30 % slower from one moment on.
+    /// A sudden slowdown by 30 %.
     const JUMP: Weather = |t| if t < 0.4 { 1.0 } else { 1.3 };
-    /// Two slow stretches.
+    /// Two slow phases.
     const WAVE: Weather = |t| 1.0 + 0.15 * (4.0 * std::f64::consts::TAU * t).sin();
 
     #[test]
@@ -201,7 +204,7 @@ mod tests {
             [order(0, 1), order(0, 3), order(2, 7)],
             [Ordering::Less, Ordering::Equal, Ordering::Equal]
         );
-        // Were the settings timed one after the other, the first of two equal ones would win.
+        // If the settings were timed one after the other, the first of two equal ones would win.
         let alone = |from: f64| {
             let blocks = (0..60).map(|i| DRIFT(from + 0.5 * f64::from(i) / 60.0));
             sample(vec![blocks.collect()])

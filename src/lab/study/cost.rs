@@ -1,4 +1,4 @@
-//! What a study will take, from its plan alone.
+//! Estimated time and memory of a study, from its plan alone.
 
 use super::found::TunedBudget;
 use super::{StudyPlan, is_path};
@@ -11,10 +11,11 @@ use crate::lab::estimate::{self, Estimate};
 use crate::lab::scenes::holds::{Demand, HORIZON};
 use crate::lab::scenes::{self, Description};
 
-/// Settings of a scene that are run on: winners and runners-up at three accuracies, and as many that fail.
+/// Settings of a scene with extended runs: winners and runners-up at three accuracies, and as many failing
+/// ones.
 const RUN_ON: f64 = 8.0;
 
-/// Sweeps of a step.
+/// Sweeps in one step.
 pub fn sweeps(budget: &Budget, variant: &Variant) -> u32 {
     let each = [
         (variant.uses.velocity, budget.velocity_iterations),
@@ -25,7 +26,7 @@ pub fn sweeps(budget: &Budget, variant: &Variant) -> u32 {
     budget.substeps.saturating_mul(per_substep)
 }
 
-/// Time and memory of the whole study. Errors: names and budgets that [`StudyPlan::check`] refuses.
+/// Time and memory of the whole study. Errors: names and budgets that [`StudyPlan::check`] rejects.
 pub fn estimate(plan: &StudyPlan) -> Result<Estimate, Error> {
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     let mut whole = Estimate::default();

@@ -5,31 +5,33 @@ use crate::engine::params::Budget;
 use crate::engine::world::Order;
 use crate::lab::scenes::tolerance::{Tolerance, Tolerances};
 
-/// Errors below this count as this: a logarithm has no zero.
+/// Smaller errors are raised to this value, because logarithms need positive numbers.
 pub const ERROR_FLOOR: f64 = 1e-8;
 
-/// An error to weigh time against. Rankings differ between them.
+/// An error to compare with time. Rankings differ between errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorAxis {
-    /// The penetration, as [`Errors::penetration`](crate::lab::metrics::Errors::penetration) has it: what people see.
+    /// The penetration as defined by [`Errors::penetration`](crate::lab::metrics::Errors::penetration): the
+    /// visible error.
     Penetration,
-    /// The contact-law residual, root mean square in weights of the lighter body: the mathematics.
+    /// The contact-law residual: root mean square, relative to the weight of the lighter body. The
+    /// mathematical error.
     Law,
-    /// The distance to the truth: the physics.
+    /// The distance to the reference value: the physical error.
     Truth,
-    /// The speed that is left where a scene has to rest: jitter.
+    /// The remaining speed in a scene that should come to rest: jitter.
     Rest,
 }
 
 impl ErrorAxis {
-    /// All of them, in the order of tables and plots.
+    /// The axes of tables and plots, in order.
     pub const ALL: [ErrorAxis; 3] = [ErrorAxis::Penetration, ErrorAxis::Law, ErrorAxis::Truth];
 
-    /// All that a setting is judged by.
+    /// All errors that decide whether a setting is good enough.
     pub const JUDGED: [ErrorAxis; 4] =
         [ErrorAxis::Penetration, ErrorAxis::Law, ErrorAxis::Truth, ErrorAxis::Rest];
 
-    /// The tolerance of it; none where it is not judged.
+    /// The tolerance of this error; `None` if the scene does not limit it.
     pub fn tolerance(self, tolerances: &Tolerances) -> Option<Tolerance> {
         match self {
             ErrorAxis::Penetration => Some(tolerances.penetration),
@@ -39,7 +41,7 @@ impl ErrorAxis {
         }
     }
 
-    /// For headings.
+    /// Name for headings.
     pub fn name(self) -> &'static str {
         match self {
             ErrorAxis::Penetration => "penetration",
@@ -49,21 +51,22 @@ impl ErrorAxis {
         }
     }
 
-    /// The error of a record; none if it failed, or where no truth is known or came to be seen.
+    /// The error of a record. `None` if the run failed, if the scene has no reference value, or if the run
+    /// never reached the observed event.
     pub fn of(self, record: &Record) -> Option<f64> {
         match self {
             ErrorAxis::Penetration => Some(record.errors?.penetration(record.tolerances.rest.is_some())),
             ErrorAxis::Law => Some(record.errors?.law_rms_lighter),
             ErrorAxis::Truth => record.truth?.error,
             ErrorAxis::Rest => {
-                // A minute knows better than the seconds of the run; what never rests moves more with time.
+                // The extended run of a minute is more reliable than the short run: unrest grows with time.
                 let run = record.errors?.rest_velocity;
                 Some(record.later.and_then(|later| later.rest_speed_m_s).unwrap_or(run))
             }
         }
     }
 
-    /// The unit of that error in the records of a scene.
+    /// The unit of this error in the records of a scene.
     pub fn unit(self, records: &[Record]) -> &'static str {
         match self {
             ErrorAxis::Penetration => "m",
@@ -79,27 +82,27 @@ impl ErrorAxis {
 pub struct SettingSample<'a> {
     /// Its record.
     pub record: &'a Record,
-    /// Which of the solver's budgets, in the order in which they were tried.
+    /// Index of the budget among the solver's budgets, in the order in which they were tried.
     pub budget: usize,
     /// Time of a step (ns).
     pub time: f64,
-    /// At least [`ERROR_FLOOR`].
+    /// The error, at least [`ERROR_FLOOR`].
     pub error: f64,
 }
 
 /// The settings of a solver on one scene.
 ///
-/// They are different runs: between two of them there is nothing to interpolate. What the solver
-/// can do in a given time, or to a given error, is what one of its settings does.
+/// The settings are separate runs, so curves are not interpolated. The result of a solver in a given time, or
+/// within a given error, is the result of one of its settings.
 #[derive(Clone, Debug)]
 pub struct Curve<'a> {
     /// Name of the solver.
     pub solver: &'static str,
-    /// Settings that do not hold, or have no such error, are left out.
+    /// The settings. Those that do not hold or have no such error are left out.
     pub samples: Vec<SettingSample<'a>>,
 }
 
-/// Budgets of a solver, with its parameters, in the order in which they were tried.
+/// Budgets of a solver with their parameters, in the order in which they were tried.
 pub fn budgets_of<'a>(records: &'a [Record], solver: &str) -> Vec<(Budget, &'a str)> {
     let mut budgets = Vec::new();
     for record in records.iter().filter(|r| r.solver == solver) {
@@ -111,7 +114,7 @@ pub fn budgets_of<'a>(records: &'a [Record], solver: &str) -> Vec<(Budget, &'a s
     budgets
 }
 
-/// Solvers in the order in which they were tried.
+/// Solvers, in the order in which they were tried.
 pub fn solvers_of(records: &[Record]) -> Vec<&'static str> {
     let mut solvers = Vec::new();
     for record in records {
@@ -149,21 +152,21 @@ pub fn curves(records: &[Record], axis: ErrorAxis) -> Vec<Curve<'_>> {
 }
 
 impl<'a> Curve<'a> {
-    /// The setting of least error among those that take at most `time` (ns); of equal ones the
-    /// fastest. None if all take longer.
+    /// The setting with the smallest error among those that take at most `time` (ns). Of equal ones, the
+    /// fastest. `None` if all take longer.
     pub fn best_within(&self, time: f64) -> Option<SettingSample<'a>> {
         let within = self.samples.iter().filter(|s| s.time <= time);
         within.copied().min_by(|a, b| a.error.total_cmp(&b.error).then(a.time.total_cmp(&b.time)))
     }
 
-    /// The fastest setting among those whose error is at most `error`; of equal ones that of
-    /// least error. None if all have more.
+    /// The fastest setting among those with an error of at most `error`. Of equally fast ones, the one with
+    /// the smallest error. `None` if all errors are larger.
     pub fn fastest_within(&self, error: f64) -> Option<SettingSample<'a>> {
         let within = self.samples.iter().filter(|s| s.error <= error);
         within.copied().min_by(|a, b| a.time.total_cmp(&b.time).then(a.error.total_cmp(&b.error)))
     }
 
-    /// The settings that no other one of the solver beats in both time and error, the fastest first.
+    /// The Pareto-optimal settings of the solver in time and error, the fastest first.
     pub fn front(&self) -> Vec<SettingSample<'a>> {
         let mut sorted = self.samples.clone();
         sorted.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.error.total_cmp(&b.error)));
@@ -196,13 +199,13 @@ pub(crate) mod tests {
         let records = settings(&[(10.0, 1.0), (100.0, 0.01)]);
         let found = curves(&records, ErrorAxis::Penetration);
         let c = &found[0];
-        // In less time than the fastest setting takes there is nothing.
+        // No setting runs in less time than the fastest one.
         assert_eq!(at(c.best_within(9.9e3)), None);
-        // Between two settings it is the one that is done, not something in between.
+        // Between two settings, the cheaper one counts; nothing is interpolated.
         assert_eq!(at(c.best_within(10e3)), Some((10.0, 1.0)));
         assert_eq!(at(c.best_within(99e3)), Some((10.0, 1.0)));
         assert_eq!(at(c.best_within(100e3)), Some((100.0, 0.01)));
-        // Time to spare does no harm.
+        // Spare time does no harm.
         assert_eq!(at(c.best_within(1e9)), Some((100.0, 0.01)));
         assert_eq!(at(c.fastest_within(1e3)), Some((10.0, 1.0)));
         assert_eq!(at(c.fastest_within(0.5)), Some((100.0, 0.01)));

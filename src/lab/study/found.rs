@@ -1,6 +1,6 @@
-//! The settings that a study tries where none are given, as [`super::search`] found them.
+//! Default settings of a study, as found by [`super::search`].
 //!
-//! `simpulse study --solvers all --thorough` makes the list anew; a list that ships with the program is in
+//! `simpulse study --solvers all --thorough` rebuilds the list. The program ships with the list in
 //! `budgets.csv`.
 
 use crate::engine::constraints::Impacts;
@@ -11,35 +11,35 @@ use crate::lab::overrides;
 use serde::{Deserialize, Serialize};
 use std::sync::{Arc, LazyLock};
 
-/// Name of the list in the folder of a study that searched.
+/// File name of the list in the output folder of a study with a search.
 pub const NAME: &str = "budgets.csv";
 
-/// A budget with the solver's parameters.
+/// A budget together with the solver's parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TunedBudget {
     /// Work per step.
     pub budget: Budget,
-    /// Values in the order of the solver's table.
+    /// Parameter values, in the order of the solver's table.
     pub parameters: Parameters,
 }
 
-/// What was found for one solver on one scene.
+/// Settings found for one solver on one scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundBudgets {
-    /// Name with size.
+    /// Scene name with its size.
     pub scene: String,
-    /// Who was searched for.
+    /// Name of the solver.
     pub solver: &'static str,
     /// How impacts are solved.
     pub impacts: Impacts,
-    /// The least work first.
+    /// The settings, sorted by work, the least first.
     pub candidates: Vec<TunedBudget>,
 }
 
-/// A list of what was found.
+/// A list of found settings.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Found {
-    /// Scene by scene.
+    /// The entries, grouped by scene.
     pub entries: Vec<FoundBudgets>,
 }
 
@@ -57,15 +57,15 @@ struct BudgetLine {
 }
 
 impl Found {
-    /// The list of this program.
+    /// The list that ships with the program.
     pub fn shipped() -> Arc<Found> {
         static SHIPPED: LazyLock<Arc<Found>> =
             LazyLock::new(|| Arc::new(Found::of_csv(include_str!("budgets.csv")).unwrap_or_default()));
         SHIPPED.clone()
     }
 
-    /// What was found for a solver on a scene, with its own treatment of impacts where not with this one; none where
-    /// nobody has searched.
+    /// Settings found for a solver on a scene with this treatment of impacts, or else with the solver's own.
+    /// `None` if the list has neither.
     pub fn of(&self, scene: &str, solver: &Variant, impacts: Impacts) -> Option<Vec<TunedBudget>> {
         let with = |impacts: Impacts| {
             let is =
@@ -75,7 +75,7 @@ impl Found {
         with(impacts).or_else(|| with(Impacts::Own))
     }
 
-    /// Reads the text of a list. Errors: a text that is none; solvers and parameters that do not exist.
+    /// Parses a list in CSV format. Errors: malformed text, and unknown solvers or parameters.
     pub fn of_csv(text: &str) -> Result<Found, Error> {
         let mut entries: Vec<FoundBudgets> = Vec::new();
         for line in csv::Reader::from_reader(text.as_bytes()).deserialize() {
@@ -108,7 +108,7 @@ impl Found {
         Ok(Found { entries })
     }
 
-    /// The text of the list: a line per setting.
+    /// The list in CSV format, one line per setting.
     pub fn to_csv(&self) -> Result<Vec<u8>, Error> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         for FoundBudgets { scene, solver, impacts, candidates } in &self.entries {
@@ -136,7 +136,7 @@ mod tests {
     use crate::engine::solvers::VARIANTS;
     use crate::lab::study::{DEFAULT_SCENES, DEFAULT_SOLVERS, budget, open_scene};
 
-    /// Scenes that were not searched for every solver of the crate, for the time that it takes.
+    /// Scenes that were not searched for every solver of the crate, because that takes too long.
     const LARGE: [&str; 2] = ["pyramid:30", "circle_pile:500"];
 
     #[test]
@@ -153,7 +153,7 @@ mod tests {
                 }
             }
         }
-        // A line is a line again.
+        // Parsing and writing give back the same file.
         assert_eq!(found.to_csv().unwrap(), include_bytes!("budgets.csv"));
     }
 

@@ -1,7 +1,8 @@
 //! Extended runs: checks that recommended settings stand for a minute.
 //!
-//! A stack that stands for the five seconds of a run may fall after thirteen. So the settings that an [`Answer`]
-//! would name are extended, untimed and on all cores, and those that fail are replaced by the next.
+//! A stack that stands for the five seconds of a run may fall after thirteen. The settings that an [`Answer`]
+//! would name are therefore extended, untimed and on all cores. Each setting that fails is replaced by the
+//! next one.
 
 use super::answer::{Answer, same};
 use super::record::Later;
@@ -19,7 +20,7 @@ use crate::lab::scenes::tolerance::Accuracy;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Runs a scene that has to rest for [`HORIZON`], or for its own steps if they are more.
+/// Runs a scene that should come to rest for [`HORIZON`], or for its own steps if that is longer.
 ///
 /// Errors: a scene that cannot be built.
 pub fn later(loaded: &Loaded, settings: Settings) -> Result<Later, Error> {
@@ -52,7 +53,7 @@ pub fn later(loaded: &Loaded, settings: Settings) -> Result<Later, Error> {
     Ok(later)
 }
 
-/// What to do with each of a list, on all cores; results in the order of the list.
+/// Calls `work` for each item of a list, on all cores. Results are in the order of the list.
 pub fn in_parallel<T: Sync, R: Send>(
     list: &[T],
     work: impl Fn(&T) -> Result<R, Error> + Sync,
@@ -80,8 +81,8 @@ pub fn in_parallel<T: Sync, R: Send>(
     slots.into_iter().filter_map(|slot| slot.into_inner().ok().flatten()).collect()
 }
 
-/// Runs on the settings of a scene that an answer at some accuracy would name, until all of them are known to
-/// stand, or to be the last.
+/// Extends the settings of a scene that an answer at some accuracy would name, until every named setting has
+/// an extended run.
 ///
 /// Errors: as [`later`].
 pub fn run_on(
@@ -94,7 +95,8 @@ pub fn run_on(
         let mut untried: Vec<&Record> = Vec::new();
         for accuracy in Accuracy::ALL {
             let Some(answer) = Answer::at(records, accuracy) else { return Ok(()) };
-            // What a solver is good for is said of plausible runs: there each has to stand.
+            // Statements about each solver refer to plausible runs, so there the best setting of each solver
+            // is extended.
             let each = if accuracy == Accuracy::Plausible { answer.of_each_solver() } else { Vec::new() };
             for record in answer.untried().chain(each.into_iter().filter(|r| r.later.is_none())) {
                 if untried.iter().all(|other| !same(other, record)) {
@@ -115,7 +117,7 @@ pub fn run_on(
     }
 }
 
-/// The settings of a record.
+/// The settings of a record's run.
 fn settings(record: &Record) -> Result<Settings, Error> {
     let solver = find(record.solver)?;
     let width = LaneWidth::from_lanes(record.lanes).unwrap_or(LaneWidth::W1);
@@ -141,7 +143,7 @@ mod tests {
             settings.budget.velocity_iterations = velocity_iterations;
             later(&scenes::load("stack:20").unwrap(), settings).unwrap()
         };
-        // Eight sweeps do not carry twenty boxes.
+        // Eight sweeps do not support twenty boxes.
         let fallen = run("pgs", 8);
         assert_eq!(fallen.broken.map(|b| b.mark), Some(Mark::Fell), "{fallen:?}");
         assert!(fallen.broken.is_some_and(|b| b.step > 0 && b.step < fallen.steps));

@@ -1,33 +1,34 @@
-//! What waves of impacts gain each solver, and what they cost: settings that ran with both treatments.
+//! Gain and cost of impact waves for each solver, from settings that ran with both treatments of impacts.
 
 use super::Record;
 use super::compare::Ratio;
 use super::curve::ErrorAxis;
 use crate::engine::constraints::Impacts;
 
-/// One solver on one scene, over its settings: results with waves ÷ results with its own impact law.
+/// One solver on one scene, summarized over its settings: results with waves ÷ results with its own impact
+/// law.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Gain {
-    /// Name with size.
+    /// Scene name with its size.
     pub scene: String,
-    /// Its name.
+    /// Name of the solver.
     pub solver: &'static str,
-    /// Settings that ran with both, and hold with its own and with waves.
+    /// Number of settings that ran with both treatments.
     pub settings: usize,
-    /// Of them.
+    /// Number of these that hold, with the solver's own law and with waves.
     pub holds: [usize; 2],
     /// Median ratio of the contact-law residuals (1).
     pub residual: f64,
-    /// Median ratio of the distances to the reference value (1); none where none is known.
+    /// Median ratio of the distances to the reference value (1); `None` if the scene has no reference value.
     pub reference: Option<f64>,
-    /// Median ratio of the times (1); none without times.
+    /// Median ratio of the times (1); `None` without times.
     pub time: Option<f64>,
 }
 
-/// Ratios to errors below this are those to this: nothing is infinitely better.
+/// Smaller errors are raised to this value before a ratio is formed, so that no ratio is infinite.
 const NOTHING: f64 = 1e-9;
 
-/// A line per scene and solver that ran with both treatments.
+/// One entry for each scene and solver that ran with both treatments.
 pub fn gains(records: &[Record]) -> Vec<Gain> {
     let mut found: Vec<Gain> = Vec::new();
     for scene in records.chunk_by(|a, b| a.scene == b.scene) {

@@ -1,9 +1,9 @@
 //! Interleaved timing: all settings of a scene take turns, in blocks of steps.
 //!
-//! Clock rate and load of a machine change from second to second, so times measured one setting after another are not
-//! comparable. Here every setting of a scene has its own world, and in every round each world runs the same block of
-//! steps, in an order that rotates from round to round. Settings are compared by blocks of the same round
-//! ([`super::compare`]), so slow changes affect both.
+//! The clock rate and load of a machine change from second to second, so times measured one setting after
+//! another are not comparable. Here every setting of a scene has its own world. In every round, each world
+//! runs the same block of steps, in an order that rotates from round to round. Settings are compared by
+//! blocks of the same round ([`super::compare`]), so slow changes affect all settings alike.
 //!
 //! ```text
 //! block:  ○ ● ● ● ● ● ● ● ● ◐     ○ meets cold caches, not timed
@@ -11,14 +11,14 @@
 //!                                 ◐ read phase by phase, which costs as much as a small step
 //! ```
 //!
-//! Blocks begin elsewhere in every pass, so that a step that one pass leaves out is timed by another; the first
-//! step of a run is always timed, because it is as cold in any program. The time of a step is the median over
-//! the passes: what only one of them saw is the machine's, what comes back is the solver's. Mean, median and
-//! longest step of the run are taken of these.
+//! Blocks start at other steps in every pass, so that a step left out in one pass is timed in another. The
+//! first step of a run is always timed, because it is cold in any program. The time of a step is the median
+//! over the passes: an outlier in a single pass is attributed to the machine, a recurring one to the solver.
+//! Mean, median and longest step of the run are computed from these medians.
 //!
-//! Where the thread waited for a processor, the wait is subtracted from a long step, and a block of short ones is
-//! left out. A setting that waited in every block keeps its steps without the waits, but has no block to be compared
-//! by: it ties with everything.
+//! If the thread waited for a processor, the wait is subtracted from a long step, while a block of short
+//! steps is left out. A setting that waited in every block keeps its steps without the waits but has no
+//! blocks to compare, so it ties with everything.
 
 use super::sample::{LoadSum, Sample, median, quantile};
 use crate::engine::clock::{Phase, waited};
@@ -31,31 +31,31 @@ use rand_pcg::Pcg64;
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-/// Most steps of a block.
+/// Maximum number of steps in a block.
 const BLOCK: u32 = 10;
 
-/// Blocks that a pass has at least, if it has steps for them.
+/// Minimum number of blocks in a pass, if it has enough steps.
 const LEAST_BLOCKS: u32 = 12;
 
-/// Fewest steps of a block, one of each kind.
+/// Minimum number of steps in a block, one of each kind.
 const LEAST_BLOCK: u32 = 3;
 
-/// The blocks of a pass begin by so much of their length before those of the last one.
+/// In each pass, blocks start earlier than in the previous pass by a block length divided by this number.
 const SHIFTS: u32 = 4;
 
-/// From here on (ns) the wait is read around every step: it takes some microseconds.
+/// Time of a step (ns) above which the wait is read around the next step. Reading it takes some microseconds.
 const LONG_STEP: f64 = 2e5;
 
-/// A block of short steps is left out if the thread waited for more than this share of it (1).
+/// A block of short steps is left out if the thread waited for more than this fraction of it (1).
 const WAITED: f64 = 0.01;
 
-/// Lets `count` settings take turns in so many rounds: `turn(setting, round)` for each of them.
+/// Lets `count` settings take turns for a number of rounds, with one call `turn(setting, round)` for each.
 ///
-/// The order of a round is the last one's, rotated. Read from its start it goes 0, 1, −1, 2, −2, …,
-/// and every second round is read backward (Williams 1949), so that who comes after whom changes,
-/// too: a setting that leaves the caches full of its own does not always leave them to the same one.
-/// It rotates by the golden section of the count, so that after any number of rounds everybody has
-/// been early and late about as often.
+/// The order of a round is that of the previous one, rotated. Read from its start it goes 0, 1, −1, 2, −2, …,
+/// and every second round is read backward (Williams 1949). The predecessor of a setting therefore changes,
+/// too: a setting that fills the caches does not always run before the same one. The rotation is the golden
+/// section of the count, so that after any number of rounds every setting has been early and late about
+/// equally often.
 pub fn take_turns(count: usize, rounds: usize, mut turn: impl FnMut(usize, usize)) {
     const GOLDEN: f64 = 0.618_033_988_749_895;
     for round in 0..rounds {
@@ -70,29 +70,29 @@ pub fn take_turns(count: usize, rounds: usize, mut turn: impl FnMut(usize, usize
     }
 }
 
-/// Settings, timed in turns.
+/// Settings that are timed in turns.
 pub struct Interleaved<'a> {
-    /// Each with its scene: one for all, or variants of one.
+    /// Each setting with its scene: one scene for all, or variants of one.
     settings: Vec<(&'a Scene, Settings)>,
     steps: u32,
-    /// So far.
+    /// Number of passes so far.
     passes: u32,
     timings: Vec<Timing>,
     random: Pcg64,
 }
 
-/// What is kept of one setting.
+/// Measurements of one setting.
 #[derive(Clone, Default)]
 struct Timing {
-    /// `[pass][step]` (ns); not a number where a step was not timed.
+    /// `[pass][step]` (ns); NaN for steps that were not timed.
     steps: Vec<Vec<f64>>,
-    /// Steps of blocks that were left out (ns), the wait taken from the longest of each.
+    /// Steps of blocks that were left out (ns). The wait is subtracted from the longest step of each block.
     spare: Vec<f64>,
     /// `[pass][block]` (ns per step)
     blocks: Vec<Vec<f64>>,
-    /// Passes that it took part in.
+    /// Number of passes.
     rounds: u32,
-    /// Time in which the thread waited, and in which the steps ran (ns).
+    /// Total time in which the thread waited, and in which the steps ran (ns).
     waited_and_ran: [f64; 2],
     phases: [Vec<f64>; Phase::ALL.len()],
     row_sweep: Vec<f64>,
@@ -102,7 +102,7 @@ struct Timing {
     failure: Option<Divergence>,
 }
 
-/// The steps of a pass in blocks; all but the first and the last are of one length.
+/// The steps of a pass, divided into blocks. All but the first and the last block have the same length.
 fn blocks(steps: u32, pass: u32) -> Vec<Range<u32>> {
     let length = (steps / LEAST_BLOCKS).clamp(LEAST_BLOCK, BLOCK).min(steps).max(1);
     let first = length - pass * length.div_ceil(SHIFTS) % length;
@@ -113,17 +113,17 @@ fn blocks(steps: u32, pass: u32) -> Vec<Range<u32>> {
 }
 
 impl<'a> Interleaved<'a> {
-    /// Of the first `steps` steps; `seed` decides who begins.
+    /// For the first `steps` steps. `seed` decides the initial order.
     pub fn new(settings: Vec<(&'a Scene, Settings)>, steps: u32, seed: u64) -> Self {
         let timings = vec![Timing::default(); settings.len()];
         Interleaved { settings, steps, passes: 0, timings, random: Pcg64::seed_from_u64(seed) }
     }
 
-    /// Goes through the steps so many times with all settings; a world that diverges drops out.
+    /// Runs the steps `passes` times with all settings. A world that diverges drops out.
     pub fn run(&mut self, passes: u32) -> Result<(), Error> {
         let mut names: Vec<usize> = (0..self.settings.len()).collect();
         for _ in 0..passes {
-            // Nobody's place in the list is a place in the order.
+            // The position in the list must not decide the position in the order.
             names.shuffle(&mut self.random);
             let mut worlds: Vec<World> = Vec::new();
             for &i in &names {
@@ -155,13 +155,13 @@ impl<'a> Interleaved<'a> {
         Ok(())
     }
 
-    /// What was found about a setting; why it dropped out, if it did.
+    /// Measurements of a setting, or the divergence that made it drop out.
     pub fn sample(&self, setting: usize) -> Result<Sample, Divergence> {
         self.timings[setting].sample()
     }
 }
 
-/// Times all settings of a scene side by side; a world that diverges drops out.
+/// Times all settings of a scene in turns. A world that diverges drops out.
 pub fn time_in_turns(
     scene: &Scene,
     settings: &[Settings],
@@ -177,9 +177,9 @@ pub fn time_in_turns(
 }
 
 impl Timing {
-    /// Goes one block, the last pass's number `round`.
+    /// Runs one block, number `round` of the current pass.
     fn go(&mut self, world: &mut World, steps: Range<u32>, round: usize) {
-        // Of one step there is no cold one and none for the phases.
+        // A shorter block has no cold step and no step with timed phases.
         let whole = steps.len() >= LEAST_BLOCK as usize;
         let before = waited();
         let (mut times, mut taken) = (Vec::with_capacity(steps.len()), 0.0);
@@ -199,13 +199,13 @@ impl Timing {
         let ran = times.iter().filter(|t| t.is_finite()).sum::<f64>();
         let waits = waited().zip(before).map_or(0.0, |(after, before)| nanos(after.saturating_sub(before)));
         self.waited_and_ran = [self.waited_and_ran[0] + waits, self.waited_and_ran[1] + ran];
-        // What was not taken from a step is somewhere in the block.
+        // The part of the wait that was not subtracted from a step occurred elsewhere in the block.
         if waits - taken > WAITED * ran {
             let mut kept: Vec<f64> = times.into_iter().filter(|t| t.is_finite()).collect();
             if let Some(longest) = kept.iter_mut().max_by(|a, b| a.total_cmp(b)) {
                 *longest = (*longest - (waits - taken)).max(0.0);
             }
-            // Where the wait was in a step that is not among them, nothing is left of the longest.
+            // If the wait occurred in an untimed step, the longest step may drop to zero.
             self.spare.extend(kept.into_iter().filter(|t| *t > 0.0));
             return;
         }
@@ -232,7 +232,7 @@ impl Timing {
         (nanos(elapsed - pause), nanos(pause))
     }
 
-    /// One step, phase by phase.
+    /// One step with all phases timed.
     fn clocked(&mut self, world: &mut World) {
         world.settings.timed = true;
         self.failure = world.step().err();
@@ -288,7 +288,7 @@ impl Timing {
     }
 }
 
-/// Time of a chain of multiply-adds that nothing can shorten (ns): about 10 µs.
+/// Time of a chain of dependent multiply-adds (ns), about 10 µs. No optimization can shorten it.
 fn yardstick() -> f64 {
     const LINKS: u32 = 4000;
     let start = Instant::now();
@@ -308,7 +308,7 @@ fn nanos(duration: Duration) -> f64 {
 pub(crate) mod tests {
     use super::*;
 
-    /// A sample of these blocks (ns per step), `[pass][block]`.
+    /// A sample with these blocks (ns per step), `[pass][block]`.
     pub fn sample(blocks: Vec<Vec<f64>>) -> Sample {
         let rounds = blocks.len() as u32;
         Timing { steps: blocks.clone(), blocks, rounds, ..Timing::default() }.sample().unwrap()
@@ -316,7 +316,7 @@ pub(crate) mod tests {
 
     #[test]
     fn the_spread_is_of_repeats_and_not_of_blocks() {
-        // Blocks cost 10, 20 and 30; one repeat in three was interrupted, and one took no part.
+        // Blocks cost 10, 20 and 30. One pass of three was interrupted, and one was not timed.
         let s = sample(vec![
             vec![10.0, 20.0, 30.0],
             vec![11.0, 21.0, 30.0],
@@ -353,7 +353,7 @@ pub(crate) mod tests {
             (spiky.mean_ns, spiky.median_ns, spiky.worst_ns, spiky.spikes()),
             (20.0, 10.0, 210.0, 2.0)
         );
-        // One pass cannot tell.
+        // A single pass cannot tell spikes of the solver from those of the machine.
         let mut once = vec![10.0; 20];
         once[3] = 900.0;
         assert_eq!(sample(vec![once]).spikes(), 1.0);
@@ -380,7 +380,7 @@ pub(crate) mod tests {
         turns.run(3).unwrap();
         let timing = &turns.timings[0];
         for step in 0..60 {
-            // Blocks in which the thread waited are left out as a whole.
+            // Blocks in which the thread waited are left out entirely.
             let whole = timing.blocks.iter().flatten().all(|t| t.is_finite());
             assert!(!whole || timing.steps.iter().any(|pass| pass[step].is_finite()), "{step}");
         }
@@ -403,7 +403,7 @@ pub(crate) mod tests {
                 sorted.sort();
                 assert_eq!(sorted, (0..count).collect::<Vec<_>>());
             }
-            // The mean place of everybody is the middle, to a twentieth of the field.
+            // The mean position of every setting is the middle, to a twentieth of the count.
             for own in &places {
                 let mean = own.iter().enumerate().map(|(i, n)| (i * n) as f64).sum::<f64>() / rounds as f64;
                 assert!(
@@ -411,7 +411,7 @@ pub(crate) mod tests {
                     "{count} {mean}"
                 );
             }
-            // Who comes before 0: many different ones.
+            // The predecessors of setting 0: many different ones.
             let before = |round: &Vec<usize>| {
                 let at = round.iter().position(|&e| e == 0)?;
                 Some(round[at.checked_sub(1)?])

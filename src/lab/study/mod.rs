@@ -1,12 +1,13 @@
 //! Studies: solvers × scenes × budgets × lane widths → [`Record`]s of speed and error.
 //!
-//! Every setting runs twice. *Errors* come from one run with impulses recorded, on all cores in parallel, because no
-//! clock is read. *Times* come from [interleaved timing](interleave) of all settings of a scene in common rounds, on
-//! one core. All colored widths and the error run must agree to the last bit ([`Record::bits_equal`]). Settings that
-//! would be recommended are then [extended](horizon) to a minute, untimed and on all cores.
+//! Every setting runs twice. *Errors* come from one run with recorded impulses. No clock is read, so these
+//! runs use all cores in parallel. *Times* come from [interleaved timing](interleave) of all settings of a
+//! scene in common rounds, on one core. All colored widths and the error run must agree to the last bit
+//! ([`Record::bits_equal`]). Settings that would be recommended are then [extended](horizon) to a minute,
+//! untimed and on all cores.
 //!
-//! Which settings of a solver run on a scene is [found](search) by errors alone, with one rule for all, and
-//! [recorded](found).
+//! The settings that a solver runs on a scene are [found](search) by errors alone, with one rule for all
+//! solvers, and [recorded](found).
 
 #[doc(hidden)]
 pub mod answer;
@@ -63,7 +64,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use sweep::Swept;
 
-/// Scenes of the default study: each shows something that the others do not.
+/// Scenes of the default study. Each one shows an effect that the others do not.
 pub const DEFAULT_SCENES: [&str; 11] = [
     "incline_slip",
     "bounce",
@@ -78,9 +79,9 @@ pub const DEFAULT_SCENES: [&str; 11] = [
     "circle_pile:500",
 ];
 
-/// Solvers that are compared where none are named: sequential impulses without and with position sweeps,
-/// accelerated, in parallel, in substeps, of positions, and soft; all of them fast. All others of
-/// [`VARIANTS`] run when they are named, or with `all`.
+/// Default solvers of a comparison: sequential impulses without and with position sweeps, accelerated, in
+/// parallel, in substeps, position-based, and soft; all of them fast. The other [`VARIANTS`] run if they are
+/// named, or with `all`.
 pub const DEFAULT_SOLVERS: [&str; 7] =
     ["pgs", "pgs_ngs_block", "nncg", "tgs_ngs", "xpbd", "soft_step", "shim"];
 
@@ -89,8 +90,8 @@ pub fn default_solvers() -> Vec<&'static Variant> {
     DEFAULT_SOLVERS.iter().filter_map(|name| find(name).ok()).collect()
 }
 
-/// The solvers of the crate that a comparison of `ran` left out, where `ran` is the default list: who
-/// names solvers knows what is left out.
+/// Solvers of the crate that a default comparison leaves out. Empty unless `ran` is the default list, because
+/// the choice was explicit then.
 pub fn left_out(ran: &[&str]) -> Vec<&'static str> {
     let is_default =
         ran.len() == DEFAULT_SOLVERS.len() && ran.iter().all(|name| DEFAULT_SOLVERS.contains(name));
@@ -98,20 +99,21 @@ pub fn left_out(ran: &[&str]) -> Vec<&'static str> {
     others.collect()
 }
 
-/// What a study is at, for a progress bar.
+/// State of a running study, for a progress bar.
 #[derive(Clone, Debug)]
 pub struct Progress {
-    /// Runs begun before this one.
+    /// Number of runs started before this one.
     pub done: usize,
-    /// Runs in all.
+    /// Total number of runs.
     pub total: usize,
-    /// What runs now.
+    /// Description of the current run.
     pub what: String,
 }
 
-/// The settings that share an error run per order, one per scene, value of a sweep, solver and budget.
+/// The settings that share an error run per order: one cell for each scene, value of a sweep, solver and
+/// budget.
 struct ErrorCell<'a> {
-    /// Place of the scene, and of the value of the sweep.
+    /// Index of the scene, and of the value of the sweep.
     scene: [usize; 2],
     swept: Option<Swept>,
     name: &'a str,
@@ -119,12 +121,12 @@ struct ErrorCell<'a> {
     impacts: Impacts,
     budget: Budget,
     parameters: Parameters,
-    /// Whether it runs at its widest lanes alone, see [`StudyPlan::widest_alone`].
+    /// Whether the cell runs at its widest lanes only, see [`StudyPlan::widest_alone`].
     widest_alone: bool,
 }
 
 impl ErrorCell<'_> {
-    /// Its budget, and those parameters that are not the solver's own.
+    /// Its budget, and the parameters that differ from the solver's defaults.
     fn text(&self) -> String {
         let budget = budget::with_impacts(budget::brief(&self.budget, self.solver), self.impacts);
         let parameters = overrides::brief(self.solver, &self.parameters);
@@ -132,23 +134,23 @@ impl ErrorCell<'_> {
     }
 }
 
-/// What an error run found.
+/// Results of an error run.
 #[derive(Clone)]
 pub struct RunOutcome {
-    /// Those of the whole run; where it failed, by what.
+    /// Errors of the whole run, or the divergence that ended it.
     pub errors: Result<Errors, Divergence>,
-    /// Distance to what is known about the scene.
+    /// Distance to the scene's reference value.
     pub truth: Option<TruthError>,
-    /// The first demand of the scene that was not met.
+    /// The first violated requirement of the scene.
     pub broken: Option<Broken>,
-    /// Hash after the steps of a timing run.
+    /// Hash of the state after the steps of a timing run.
     pub hash: u64,
 }
 
-/// Runs the plan; one record per scene, solver, budget, order and width, in that order. `finished` is given the
-/// records of a scene as soon as they are complete.
+/// Runs the plan. Returns one record per scene, solver, budget, order and width, in that order. `finished`
+/// receives the records of a scene as soon as they are complete.
 ///
-/// Errors: what [`StudyPlan::check`] refuses. A run that diverges is a record, not an error.
+/// Errors: anything that [`StudyPlan::check`] rejects. A run that diverges is a record, not an error.
 pub fn run(
     plan: &StudyPlan,
     progress: &(dyn Fn(Progress) + Sync),
@@ -212,10 +214,10 @@ pub fn run(
     Ok(records)
 }
 
-/// What nobody came to see in a shortened run is not judged.
+/// Removes tolerances for errors that a shortened run could not observe.
 fn leave_out_unseen(records: &mut [Record], scene: &Scene) {
     if f64::from(scene.steps) * scene.dt < 2.0 * crate::lab::metrics::rest::REST_WINDOW {
-        // Rest is judged over the last second, and there has to be something before it.
+        // Rest is measured over the last second, which must be preceded by at least as long a run.
         records.iter_mut().for_each(|r| r.tolerances.rest = None);
     }
     for scene in records.chunk_by_mut(|a, b| a.scene == b.scene) {
@@ -225,11 +227,11 @@ fn leave_out_unseen(records: &mut [Record], scene: &Scene) {
     }
 }
 
-/// Settings of a cell in one order at one width.
+/// Settings of a cell for one order and one width.
 fn settings(plan: &StudyPlan, cell: &ErrorCell, order: Order, width: LaneWidth) -> Settings {
     let mut parameters = cell.parameters;
     if let Some((sweep, point)) = plan.sweep.as_ref().zip(cell.swept) {
-        // Checked with the plan.
+        // Errors were ruled out when the plan was checked.
         let _ = sweep.set(point.value, &mut parameters, cell.solver);
     }
     Settings {
@@ -241,12 +243,13 @@ fn settings(plan: &StudyPlan, cell: &ErrorCell, order: Order, width: LaneWidth) 
     }
 }
 
-/// Steps of a timing run of scenes that take turns.
+/// Number of steps of a timing run for scenes that take turns.
 fn timing_steps<'a>(plan: &StudyPlan, scenes: impl IntoIterator<Item = &'a Scene>) -> u32 {
     scenes.into_iter().map(|scene| scene.steps).fold(plan.timing_steps, u32::min)
 }
 
-/// Every cell in every order, on all cores; `[cell][order]`. `timed`: steps of a timing run of each scene.
+/// Runs every cell in every order, on all cores; `[cell][order]`. `timed`: steps of a timing run of each
+/// scene.
 fn error_runs(
     plan: &StudyPlan,
     cells: &[ErrorCell],
@@ -290,12 +293,13 @@ fn error_run(plan: &StudyPlan, cell: &ErrorCell, order: Order, timed: u32) -> Re
     observe(loaded, settings(plan, cell, order, width), timed)
 }
 
-/// Runs a scene to its end and measures its errors; the hash is that after step `hash_at`.
+/// Runs a scene to its end and measures its errors. The hash is taken after step `hash_at`.
 pub fn observe(loaded: Loaded, settings: Settings, hash_at: u32) -> Result<RunOutcome, Error> {
     observe_while(loaded, settings, hash_at, &|_, _| true)
 }
 
-/// The same up to the first demand that is not met, and the work of a mean step: its sweeps and substeps.
+/// The same up to the first violated requirement. Also returns the work of an average step: its sweeps and
+/// substeps.
 fn observe_until_broken(loaded: Loaded, settings: Settings) -> Result<(RunOutcome, f64), Error> {
     let (steps, work) = (std::cell::Cell::new(0.0), std::cell::Cell::new(0.0));
     let substeps = f64::from(settings.budget.substeps);
@@ -307,7 +311,7 @@ fn observe_until_broken(loaded: Loaded, settings: Settings) -> Result<(RunOutcom
     Ok((outcome, work.get() / f64::max(steps.get(), 1.0)))
 }
 
-/// The same, while `goes_on` after a step.
+/// The same, as long as `goes_on` returns true after a step.
 fn observe_while(
     loaded: Loaded,
     settings: Settings,
@@ -347,7 +351,7 @@ fn observe_while(
     })
 }
 
-/// What becomes a record.
+/// Source of a record.
 struct RecordRow<'a> {
     cell: &'a ErrorCell<'a>,
     order: Order,
@@ -355,7 +359,7 @@ struct RecordRow<'a> {
     outcome: &'a RunOutcome,
 }
 
-/// The orders and widths of a cell.
+/// All orders and widths of a cell.
 fn rows<'a>(plan: &StudyPlan, cell: &'a ErrorCell, outcomes: &'a [RunOutcome]) -> Vec<RecordRow<'a>> {
     let mut rows = Vec::new();
     for (&order, outcome) in plan.orders.iter().zip(outcomes) {
@@ -370,8 +374,8 @@ fn rows<'a>(plan: &StudyPlan, cell: &'a ErrorCell, outcomes: &'a [RunOutcome]) -
     rows
 }
 
-/// Times in common rounds all settings of a scene that did not diverge. `variants`: the scene at each value of
-/// the sweep.
+/// Times all settings of a scene that did not diverge, in common rounds. `variants`: the scene at each value
+/// of the sweep.
 fn timed_records(
     plan: &StudyPlan,
     variants: &[Loaded],
@@ -419,7 +423,7 @@ fn timed_records(
     Ok(records)
 }
 
-/// The record of a setting with its times, if it has any; why it failed, if it did.
+/// The record of a setting, with its times if there are any, and its failure if it failed.
 fn record_of(
     plan: &StudyPlan,
     loaded: &Loaded,

@@ -1,35 +1,35 @@
-//! How evenly a run is paced: its steps over the median of steps with as many contacts.
+//! Pacing of a run: the time of each step relative to the median of steps with as many contacts.
 //!
-//! A run is the same every time, so the time of a step is the least of several repeats, and what else the machine does
-//! is left out. More contacts take longer, so a step is compared with the 31 steps of the run that have most
-//! nearly as many, and by contact where it has more than those: bodies that start in each other have three times the contacts
-//! of any later step.
+//! A run is deterministic, so the time of a step is the minimum over several repeats, which excludes
+//! disturbances by the machine. More contacts take longer, so a step is compared with the 31 steps of the run
+//! with the most similar numbers of contacts. If it has more contacts than those, times per contact are
+//! compared: a run with initially overlapping bodies starts with three times the contacts of any later step.
 
 use super::sample::median;
 use crate::engine::clock::timed;
 use crate::engine::world::World;
 use crate::lab::error::Error;
 
-/// Steps that a step is compared with.
+/// Number of steps that a step is compared with.
 const NEAREST: usize = 31;
 
-/// Steps of a run over the median of steps with as many contacts (1).
+/// Step times of a run relative to the median of steps with as many contacts (1).
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Pace {
-    /// Median step of the run (ns).
+    /// Median step time of the run (ns).
     pub median_ns: f64,
     /// The first step, in which pairs, memory and contacts are new.
     pub first: f64,
-    /// The longest of all others, and which it is, from 1.
+    /// The longest of all other steps.
     pub longest: f64,
-    /// See `longest`.
+    /// Index of the longest step, counted from 1.
     pub longest_step: u32,
-    /// Mean of all steps.
+    /// Mean over all steps.
     pub mean: f64,
 }
 
 impl Pace {
-    /// The pace of a run of `steps` steps, or up to where it diverges. Errors: a world that cannot be built.
+    /// The pace of a run of `steps` steps, or until it diverges. Errors: a world that cannot be built.
     pub fn measure(
         build: impl Fn() -> Result<World, Error>,
         steps: u32,
@@ -56,7 +56,7 @@ impl Pace {
         Ok(Self::of(&times, &contacts))
     }
 
-    /// Of steps that took so long (ns) and had so many contacts.
+    /// From the times (ns) and numbers of contacts of all steps.
     fn of(times: &[f64], contacts: &[usize]) -> Self {
         let mut order: Vec<usize> = (0..times.len()).collect();
         order.sort_by_key(|&step| contacts[step]);
@@ -88,14 +88,15 @@ mod tests {
 
     #[test]
     fn a_step_is_compared_with_those_of_as_many_contacts() {
-        // 1 µs a contact; step 51 takes five times that.
+        // 1 µs per contact; step 51 takes five times as long.
         let contacts: Vec<usize> = (0..100).map(|step| 10 + 10 * (step / 50)).collect();
         let mut times: Vec<f64> = contacts.iter().map(|&n| 1e3 * n as f64).collect();
         times[50] *= 5.0;
         let pace = Pace::of(&times, &contacts);
         assert_eq!((pace.first, pace.longest, pace.longest_step), (1.0, 5.0, 51));
         assert!((pace.mean - 1.04).abs() < 1e-9 && pace.median_ns == 15e3, "{pace:?}");
-        // Two steps with four times the contacts of all others, the second of them twice as slow as they allow.
+        // Two steps have four times the contacts of all others, and the second one takes twice the expected
+        // time.
         let contacts: Vec<usize> = (0..100).map(|step| if step < 2 { 40 } else { 10 }).collect();
         let mut times: Vec<f64> = contacts.iter().map(|&n| 1e3 * n as f64).collect();
         times[1] *= 2.0;

@@ -1,20 +1,19 @@
-//! Which settings nobody would give up: the front of speed against error.
+//! The Pareto front of time and error.
 //!
-//! A setting is dominated if another one is at least as good in time and in error, and better in
-//! one of them. Times that [tie](compare) are equal, so that noise neither wins nor loses a place.
-//! Without ties this is the usual front; with them, a setting that is faster by noise alone must
-//! have the smaller error.
+//! A setting is dominated if another one is at least as good in time and in error, and better in one of them.
+//! Times that [tie](compare) count as equal, so that noise decides nothing. Without ties this is the usual
+//! front. With them, a setting that is faster by noise alone must have the smaller error.
 
 use super::compare::compare;
 use super::sample::Sample;
 use std::cmp::Ordering;
 
-/// What a setting costs and how wrong it is.
+/// Time and error of a setting.
 #[derive(Clone, Copy, Debug)]
 pub struct TimeAndError<'a> {
     /// Times of the setting's fastest lane width.
     pub sample: &'a Sample,
-    /// Any error ≥ 0.
+    /// Any error, ≥ 0.
     pub error: f64,
 }
 
@@ -26,7 +25,7 @@ impl TimeAndError<'_> {
     }
 }
 
-/// For each point, whether no other dominates it.
+/// For each point, whether no other point dominates it.
 pub fn front(points: &[TimeAndError]) -> Vec<bool> {
     points.iter().map(|p| !points.iter().any(|q| q.dominates(p))).collect()
 }
@@ -54,7 +53,7 @@ mod tests {
         // 2 % faster, but worse: dominated. 4 % faster: on the front.
         assert_eq!(fronts(&[(98.0, 2.0), (100.0, 1.0)]), [false, true]);
         assert_eq!(fronts(&[(96.0, 2.0), (100.0, 1.0)]), [true, true]);
-        // Equal in error and tied in time: both stay.
+        // Equal errors and tied times: both stay on the front.
         assert_eq!(fronts(&[(100.0, 1.0), (101.0, 1.0)]), [true, true]);
     }
 }

@@ -1,4 +1,4 @@
-//! What a study tries, and what it refuses.
+//! The plan of a study, and its checks.
 
 use super::budget::BudgetGrid;
 use super::cost;
@@ -17,40 +17,40 @@ use crate::lab::scenes::{self, Loaded, Scene};
 use crate::lab::{estimate, files};
 use std::sync::Arc;
 
-/// What a study tries.
+/// Everything that a study runs.
 #[derive(Clone, Debug)]
 pub struct StudyPlan {
-    /// Names of the catalog, with sizes, or `.json` files.
+    /// Scene names of the catalog, with sizes, or `.json` files.
     pub scenes: Vec<String>,
     /// Rows of [`VARIANTS`](crate::engine::solvers::VARIANTS).
     pub solvers: Vec<&'static Variant>,
     /// Lane widths of colored runs.
     pub widths: Vec<LaneWidth>,
-    /// Constraint orders; only colored order has lanes.
+    /// Constraint orders; only colored order uses lanes.
     pub orders: Vec<Order>,
-    /// Impact laws; scenes where nothing bounces run only the first.
+    /// Treatments of impacts. Scenes without restitution run only the first.
     pub impacts: Vec<Impacts>,
-    /// Work per step; where nothing is given, what was [found](Self::found).
+    /// Work per step. An empty grid stands for the [found](Self::found) settings.
     pub budgets: BudgetGrid,
-    /// Settings to try where no budgets are given.
+    /// Settings to try if no budgets are given.
     pub found: Arc<Found>,
-    /// Parameters of solvers, by name.
+    /// Solver parameters, by name.
     pub overrides: Vec<Override>,
-    /// The swept quantity; none in a study of budgets.
+    /// The swept quantity; `None` in a study of budgets.
     pub sweep: Option<QuantitySweep>,
     /// Tolerances that override the scenes' own.
     pub tolerances: GivenTolerances,
-    /// Steps of an error run; where none, the scene's own.
+    /// Steps of an error run; `None` for the scene's own number.
     pub steps: Option<u32>,
-    /// Most steps of a timing run.
+    /// Maximum number of steps in a timing run.
     pub timing_steps: u32,
     /// Timing runs per setting.
     pub repeats: u32,
-    /// Random seed of the order of timing runs, and of scenes that have one.
+    /// Random seed for the order of timing runs, and for scenes with random elements.
     pub seed: u64,
 }
 
-/// Time of timing a setting in one lane (s), beyond which it is left out.
+/// Estimated time of timing a setting in one lane (s) above which that run is left out.
 const LONG: f64 = 1.0;
 
 impl Default for StudyPlan {
@@ -74,18 +74,18 @@ impl Default for StudyPlan {
     }
 }
 
-/// 1, 4 and 8 lanes, and wider ones where they are not emulated.
+/// 1, 4 and 8 lanes, and wider ones that are not emulated.
 fn widths(native: LaneWidth) -> Vec<LaneWidth> {
     LaneWidth::ALL.into_iter().filter(|&w| w <= LaneWidth::W8 || w <= native).collect()
 }
 
 impl StudyPlan {
-    /// An overview in seconds: short runs without repeats.
+    /// An overview within seconds: short runs without repeats.
     pub fn quick() -> Self {
         StudyPlan { steps: Some(60), timing_steps: 36, repeats: 1, ..StudyPlan::default() }
     }
 
-    /// Errors: a plan that cannot be run.
+    /// Checks the plan. Errors: a plan that cannot run.
     pub fn check(&self) -> Result<(), Error> {
         let empty = [
             ("scenes", self.scenes.is_empty()),
@@ -110,7 +110,7 @@ impl StudyPlan {
         }
         let mut names = Vec::new();
         for name in &self.scenes {
-            // All points of a sweep have one name.
+            // All points of a sweep share one scene name.
             let mut scene = None;
             for point in self.points() {
                 scene = Some(self.open_at(name, point)?.scene);
@@ -127,7 +127,7 @@ impl StudyPlan {
         Ok(())
     }
 
-    /// What is left out because solvers do not hold what scenes have, in lines.
+    /// One line for each solver that is left out on a scene because it does not support the scene's joints.
     ///
     /// Errors: as [`Self::check`].
     pub fn not_held(&self) -> Result<Vec<String>, Error> {
@@ -141,7 +141,8 @@ impl StudyPlan {
         Ok(lines)
     }
 
-    /// The treatments of impacts that a scene runs with: where nothing bounces they are all the same.
+    /// The treatments of impacts to run on a scene. Without restitution they are all the same, so only the
+    /// first runs.
     pub(super) fn impacts_on(&self, scene: &Scene) -> &[Impacts] {
         let bounces = scene.bodies.iter().flat_map(|b| &b.shapes).any(|s| s.restitution > 0.0);
         if bounces { &self.impacts } else { &self.impacts[..self.impacts.len().min(1)] }
@@ -151,12 +152,12 @@ impl StudyPlan {
         open_scene(name, Some(self.seed), self.steps, None)
     }
 
-    /// What a sweep sets, one after the other; one nothing without a sweep.
+    /// The points of a sweep in order; a single `None` without a sweep.
     pub(super) fn points(&self) -> Vec<Option<Swept>> {
         self.sweep.as_ref().map_or(vec![None], |sweep| sweep.points().map(Some).collect())
     }
 
-    /// A scene at a point of the sweep.
+    /// Opens a scene at a point of the sweep.
     pub(super) fn open_at(&self, name: &str, point: Option<Swept>) -> Result<Loaded, Error> {
         let Some((sweep, Swept { value, .. })) = self.sweep.as_ref().zip(point) else {
             return self.open(name);
@@ -164,12 +165,12 @@ impl StudyPlan {
         let name = sweep.scene_name(value, name)?;
         let Some(dt) = sweep.dt(value) else { return Ok(sweep.adapt(value, self.open(&name)?)) };
         let Scene { steps, dt: own, .. } = self.open(&name)?.scene;
-        // As long a time, up to rounding; the last step may begin before its end.
+        // The duration stays the same up to rounding; the last step may start before its end.
         let steps = (f64::from(steps) * own / dt * (1.0 - 1e-9)).ceil().max(1.0);
         open_scene(&name, Some(self.seed), Some(steps as u32), Some(dt))
     }
 
-    /// The budgets of a solver; at a point of a sweep there is one.
+    /// The budgets of a solver. A point of a sweep has exactly one.
     pub(super) fn budgets(&self, variant: &Variant, point: Option<Swept>) -> Result<Vec<Budget>, Error> {
         let Some(sweep) = &self.sweep else { return self.budgets.budgets(variant) };
         let standard = self.budgets == BudgetGrid::default();
@@ -178,12 +179,12 @@ impl StudyPlan {
         own.into_iter().map(at).collect()
     }
 
-    /// Whether settings are those that were found, where there are any.
+    /// Whether the found settings are used where the list has some.
     pub fn searched(&self) -> bool {
         self.sweep.is_none() && self.budgets == BudgetGrid::default()
     }
 
-    /// Scenes on which the settings of some solver were not searched.
+    /// Scenes for which the list lacks settings of some solver.
     pub fn not_searched(&self) -> Vec<&str> {
         let found =
             |scene: &Scene, solver: &Variant| self.found.of(&scene.name, solver, Impacts::Own).is_some();
@@ -195,8 +196,8 @@ impl StudyPlan {
         self.scenes.iter().filter(lacks).map(String::as_str).collect()
     }
 
-    /// Whether a setting runs in colored order at the widest lanes alone: what was found and takes more than [`LONG`] for its
-    /// timing in one lane, where nobody asked for lanes or orders.
+    /// Whether a setting runs only in colored order at the widest lanes. This applies to found settings whose
+    /// timing in one lane takes more than [`LONG`], unless lanes or orders were given.
     pub(super) fn widest_alone(
         &self,
         scene: &str,
@@ -213,8 +214,8 @@ impl StudyPlan {
         is_open && timed * step > LONG
     }
 
-    /// What a solver tries on a scene: the settings that were found for it, under the plan's parameters; the budgets
-    /// of the plan where some are given, in a sweep, and where nobody has searched.
+    /// Settings of a solver to run on a scene: the found ones with the plan's parameters. The plan's budgets
+    /// are used instead if some are given, in a sweep, and for scenes without a search.
     pub(super) fn candidates(
         &self,
         scene: &str,
@@ -244,13 +245,14 @@ impl StudyPlan {
     }
 }
 
-/// Whether a name means a file: it ends in `.json` or has a separator.
+/// Whether a name refers to a file: it ends in `.json` or contains a separator.
 pub fn is_path(name: &str) -> bool {
     name.ends_with(".json") || name.contains(['/', '\\'])
 }
 
-/// A scene of the catalog or of a file (a name with a separator, or that ends in `.json`), for
-/// so many steps of length `dt` (s) if these are given; what is known about it is for that run.
+/// Opens a scene of the catalog or of a file (a name with a separator, or one that ends in `.json`). The
+/// number of steps and their length `dt` (s) can be overridden. The reference value is then the one for that
+/// run.
 pub fn open_scene(
     name: &str,
     seed: Option<u64>,

@@ -1,24 +1,24 @@
 //! Performance profiles: the share of scenes that a solver solves within a factor of the fastest.
 //!
-//! **Source.** Dolan and Moré, "Benchmarking optimization software with performance profiles"
-//! (2002). Let t(p, s) be the least time in which any setting of the solver p holds and keeps an
-//! error of the scene s within the scene's tolerance; infinite where none does. Then
+//! **Source.** Dolan and Moré, "Benchmarking optimization software with performance profiles" (2002). Let
+//! t(p, s) be the least time in which any setting of the solver p holds and has an error within the tolerance
+//! of the scene s, and infinite if none does. Then
 //!
 //! ```text
 //! r(p, s) = t(p, s)/min over p of t(p, s),   ρ(p, τ) = share of scenes with r(p, s) ≤ τ
 //! ```
 //!
-//! ρ(p, 1) is the share of scenes on which p is fastest, ρ(p, ∞) the share that it solves at all. Scenes that no
-//! solver solves count as well. A time that ties with the smallest counts as the smallest, so that noise does not
-//! decide.
+//! ρ(p, 1) is the share of scenes on which p is fastest, ρ(p, ∞) the share that it solves at all. Scenes that
+//! no solver solves count as well. A time that ties with the smallest one counts as the smallest, so that
+//! noise decides nothing.
 
 use super::Record;
 use super::compare::compare;
 use super::curve::{ErrorAxis, solvers_of};
 use super::sample::Sample;
 
-/// For each solver the least time of its `allowed` records of one scene, relative to that of the fastest solver; a
-/// time that ties with the least is 1. None where no record is allowed.
+/// For each solver, the least time of its `allowed` records of one scene, relative to that of the fastest
+/// solver. A time that ties with the least is 1. `None` if no record is allowed.
 pub fn times_of_fastest(
     scene: &[Record],
     solvers: &[&str],
@@ -35,28 +35,28 @@ pub fn times_of_fastest(
     times.into_iter().map(|time| time.map(ratio)).collect()
 }
 
-/// One axis, all scenes.
+/// The profile along one axis, over all scenes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
-    /// The error that has to be small enough.
+    /// The error that has to be within its tolerance.
     pub axis: ErrorAxis,
-    /// Scenes that have such an error.
+    /// Number of scenes with such an error.
     pub scenes: usize,
-    /// Of those, the ones that some solver solves.
+    /// Number of those that at least one solver solves.
     pub solvable: usize,
-    /// Solver, and the ratios r(p, s) of the scenes that it solves, sorted.
+    /// For each solver, the ratios r(p, s) of the scenes that it solves, sorted.
     pub ratios: Vec<(&'static str, Vec<f64>)>,
 }
 
 impl Profile {
-    /// The profile of all records along an axis, within the tolerances of their scenes; what does not
+    /// The profile of all records along an axis, with the tolerances of their scenes. A run that does not
     /// hold solves nothing.
     pub fn of(records: &[Record], axis: ErrorAxis) -> Profile {
         let mut ratios: Vec<(&'static str, Vec<f64>)> =
             solvers_of(records).into_iter().map(|s| (s, Vec::new())).collect();
         let (mut scenes, mut solvable) = (0, 0);
         for group in records.chunk_by(|a, b| a.scene == b.scene) {
-            // A truth that nobody came to see is still a truth.
+            // A reference value counts even if no run reached the observed event.
             let known = axis != ErrorAxis::Truth || group.iter().any(|r| r.truth.is_some());
             scenes += known as usize;
             let solvers: Vec<&str> = ratios.iter().map(|(solver, _)| *solver).collect();
@@ -91,17 +91,17 @@ mod tests {
     fn shares_count_scenes_within_a_factor_of_the_fastest() {
         let good = record(8, 1, 1.0, 0.0).tolerances.penetration.value;
         let records = [
-            // a is fastest; b takes three times as long, its faster setting is too deep.
+            // a is fastest. b takes three times as long; its faster setting sinks too deep.
             on("x", "a", 10.0, good),
             on("x", "b", 30.0, 0.0),
             on("x", "b", 5.0, 2.0 * good),
             Record { scene: "x".to_string(), solver: "b", ..fell(8, 1, 1.0, 0.0) },
-            // Tied, and a alone.
+            // A tie, then a scene that only a solves.
             on("y", "a", 10.2, 0.0),
             on("y", "b", 10.0, 0.0),
             on("z", "a", 10.0, 0.0),
             on("z", "b", 1.0, 1.0),
-            // Nobody.
+            // No solver.
             on("w", "a", 1.0, 1.0),
             Record { scene: "w".to_string(), solver: "b", ..failed(8) },
         ];

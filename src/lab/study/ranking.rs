@@ -1,69 +1,74 @@
 //! Ranking of the solvers over all scenes, and its robustness.
 //!
-//! On a scene, t(p) is the least time in which any setting of the solver p holds and keeps every tolerance of the
-//! scene. Its speed there is min over p of t(p)/t(p): 1 for the fastest and for those that [tie](super::compare) with
-//! it, ½ for one that takes twice as long, 0 for one that is never good enough. The score of a solver is its mean
-//! speed over all scenes, and a scene that no solver solves lowers every score alike.
+//! On a scene, t(p) is the least time in which any setting of the solver p holds and meets every tolerance of
+//! the scene. Its speed there is min over p of t(p)/t(p): 1 for the fastest solver and for those that
+//! [tie](super::compare) with it, ½ for one that takes twice as long, 0 for one that is never good enough.
+//! The score of a solver is its mean speed over all scenes. A scene that no solver solves lowers every score
+//! alike.
 //!
-//! The choice of scenes and tolerances is arbitrary. So every score has a range: over all studies without one scene,
-//! and with half or twice the tolerances. Only a solver that is first in all of them [leads](Ranking::leader).
+//! The choice of scenes and tolerances is arbitrary. Every score therefore has a range: over all studies with
+//! one scene left out, and with half or twice the tolerances. Only a solver that is first in all of them
+//! [leads](Ranking::leader).
 
 use super::Record;
 use super::curve::solvers_of;
 use super::profile::times_of_fastest;
 use crate::lab::scenes::tolerance::Accuracy;
 
-/// A solver over all scenes.
+/// Result of a solver over all scenes.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Standing {
-    /// Its name.
+    /// Name of the solver.
     pub solver: &'static str,
-    /// Mean speed in that of the fastest, in [0, 1].
+    /// Mean speed relative to the fastest solver, in [0, 1].
     pub score: f64,
-    /// Least and greatest score with one scene left out, or with other tolerances.
+    /// Smallest and largest score with one scene left out, or with other tolerances.
     pub range: [f64; 2],
-    /// Scenes on which some setting holds.
+    /// Number of scenes on which some setting holds.
     pub holds: usize,
-    /// Scenes on which some setting holds and keeps all tolerances, at each accuracy.
+    /// Number of scenes on which some setting holds and meets all tolerances, at each accuracy.
     pub good: [usize; 3],
-    /// Of those of plausible runs, the ones on which it is the fastest, or ties with it.
+    /// Number of scenes, for plausible runs, on which it is the fastest solver or ties with it.
     pub fastest: usize,
-    /// Of those of plausible runs, the ones on which it takes at most [`CLOSE`] times as long as the fastest.
+    /// Number of scenes, for plausible runs, on which it takes at most [`CLOSE`] times as long as the
+    /// fastest.
     pub close: usize,
     /// Scenes on which none of its settings is good enough for a plausible run.
     pub fails_on: Vec<String>,
 }
 
-/// All solvers, and who is first.
+/// All solvers by score, and those that are first in some variation.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Ranking {
-    /// By their score, the best first; equal ones by name.
+    /// Sorted by score, the best first; equal ones by name.
     pub standings: Vec<Standing>,
-    /// Who is first with any scene left out, and with half and twice the tolerances; in the order of their scores.
+    /// Solvers that are first in some variation: with any scene left out, or with half or twice the
+    /// tolerances. Sorted by score.
     pub first: Vec<&'static str>,
 }
 
 impl Ranking {
-    /// The solver that is first whatever is left out; none where that depends on it.
+    /// The solver that is first in every variation; `None` if that depends on the variation.
     pub fn leader(&self) -> Option<&Standing> {
         let [only] = self.first[..] else { return None };
         self.standings.first().filter(|s| s.solver == only && s.score > 0.0)
     }
 }
 
-/// What counts as close to the fastest (1).
+/// Times up to this multiple of the fastest count as close (1).
 pub const CLOSE: f64 = 1.5;
 
-/// Tolerances that a score is tried with, in those of the scenes (1).
+/// Variations of the tolerances, as multiples of the scenes' own (1).
 const FACTORS: [f64; 2] = [0.5, 2.0];
 
-/// Speeds of the solvers on a scene, in that of the fastest; 0 where none of its settings is good enough.
+/// Speeds of the solvers on a scene, relative to the fastest; 0 if none of a solver's settings is good
+/// enough.
 fn speeds(scene: &[Record], solvers: &[&'static str], tolerance: f64) -> Vec<f64> {
     let times = times_of_fastest(scene, solvers, |r| r.excess() <= tolerance);
     times.into_iter().map(|time| time.map_or(0.0, |t| 1.0 / t)).collect()
 }
 
-/// Mean over the scenes but one of each solver's speed.
+/// Mean speed of each solver over the scenes, without one of them if given.
 fn scores(speeds: &[Vec<f64>], without: Option<usize>) -> Vec<f64> {
     let kept: Vec<&Vec<f64>> =
         speeds.iter().enumerate().filter(|(i, _)| Some(*i) != without).map(|(_, s)| s).collect();
@@ -71,7 +76,7 @@ fn scores(speeds: &[Vec<f64>], without: Option<usize>) -> Vec<f64> {
     (0..count).map(|k| kept.iter().map(|s| s[k]).sum::<f64>() / kept.len() as f64).collect()
 }
 
-/// The solvers over the scenes of `records`.
+/// Ranks the solvers over the scenes of `records`.
 pub fn ranking(records: &[Record]) -> Ranking {
     let solvers = solvers_of(records);
     let scenes: Vec<&[Record]> = records.chunk_by(|a, b| a.scene == b.scene).collect();
@@ -106,7 +111,7 @@ pub fn ranking(records: &[Record]) -> Ranking {
     };
     let mut standings: Vec<Standing> = solvers.iter().enumerate().map(standing).collect();
     standings.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.solver.cmp(b.solver)));
-    // All that share the first place are first.
+    // Solvers that share first place all count.
     let is_first = |k: usize| {
         let best = |t: &[f64]| t.iter().copied().fold(0.0, f64::max);
         tried.iter().any(|t| t[k] > 0.0 && t[k] >= best(t))
@@ -127,18 +132,18 @@ mod tests {
 
     #[test]
     fn the_score_is_the_mean_speed_of_what_is_good_enough() {
-        // 10 mm are allowed.
+        // The tolerance is 10 mm.
         let records = [
             on("x", "b", 10.0, 9e-4),
             on("x", "a", 40.0, 9e-4),
             on("x", "a", 1.0, 1.0),
-            // Tied.
+            // A tie.
             on("y", "b", 10.1, 1e-3),
             on("y", "a", 10.0, 9e-5),
-            // The faster one fell, the other one is too deep.
+            // The faster run fell, the other one sinks too deep.
             Record { scene: "z".to_string(), solver: "b", ..fell(8, 1, 1.0, 0.0) },
             on("z", "a", 2.0, 1.0),
-            // Nobody.
+            // No solver.
             Record { scene: "w".to_string(), solver: "a", ..failed(8) },
         ];
         let found = ranking(&records);
@@ -147,9 +152,9 @@ mod tests {
         assert_eq!((a.solver, a.score, a.holds, a.good), ("a", 1.25 / 4.0, 3, [2, 2, 1]));
         assert_eq!(([b.fastest, b.close], [a.fastest, a.close]), ([2, 2], [1, 1]));
         assert_eq!(a.fails_on, ["z", "w"]);
-        // Without x both have 1/3, without z or w two thirds.
+        // Without x both score 1/3, without z or w two thirds.
         assert_eq!((b.range, a.range), ([1.0 / 3.0, 2.0 / 3.0], [0.25 / 3.0, 1.25 / 3.0]));
-        // They share the first place without x.
+        // They share first place without x.
         assert_eq!((found.first.clone(), found.leader()), (vec!["b", "a"], None));
     }
 
@@ -166,7 +171,7 @@ mod tests {
         // First on every scene, at any tolerance.
         records[2] = on("y", "a", 9.0, 1e-3);
         assert_eq!(ranking(&records).leader().map(|s| s.solver), Some("a"));
-        // At half the tolerance it is not good enough any more.
+        // Not good enough at half the tolerance.
         (records[0], records[2]) = (on("x", "a", 10.0, 6e-3), on("y", "a", 9.0, 6e-3));
         assert_eq!(ranking(&records).leader(), None);
     }

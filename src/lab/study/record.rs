@@ -1,4 +1,4 @@
-//! Results of a study: one record per setting, and which records are on a Pareto front.
+//! Results of a study: one record per setting, and the records on the Pareto fronts.
 
 use super::curve::ErrorAxis;
 use super::pareto::{self, TimeAndError};
@@ -17,11 +17,11 @@ use crate::lab::units::si;
 /// One row of the study: a scene, a solver, a budget, an order and a lane width.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Record {
-    /// Name with size.
+    /// Scene name with its size.
     pub scene: String,
-    /// Bodies in it.
+    /// Number of bodies in the scene.
     pub bodies: usize,
-    /// Step (s).
+    /// Step length (s).
     pub dt: f64,
     /// Name of the solver.
     #[serde(deserialize_with = "interned::read")]
@@ -32,47 +32,47 @@ pub struct Record {
     pub lanes: usize,
     /// Work per step.
     pub budget: Budget,
-    /// The same, for tables.
+    /// Text of the budget, for tables.
     pub budget_text: String,
-    /// What happens where bodies hit each other.
+    /// Treatment of impacts.
     #[serde(default)]
     pub impacts: Impacts,
-    /// Parameters of the solver, `name=value` by blanks.
+    /// Parameters of the solver, as `name=value` separated by blanks.
     #[serde(default)]
     pub parameters: String,
-    /// What a sweep set; none without one.
+    /// Value of a sweep; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub swept: Option<Swept>,
-    /// Times and counts; none if the run failed.
+    /// Times and counts; `None` if the run failed.
     #[serde(alias = "lap")]
     pub sample: Option<Sample>,
-    /// Times faster than one colored lane; none without that run.
+    /// Speedup over one colored lane; `None` if that was not run.
     pub speed_up: Option<f64>,
-    /// Errors, the same for all widths; none if the run failed.
+    /// Errors, the same for all widths; `None` if the run failed.
     pub errors: Option<Errors>,
-    /// Distance to what is known about the scene.
+    /// Distance to the scene's reference value.
     #[serde(rename = "reference")]
     pub truth: Option<TruthError>,
-    /// How wrong the scene may be.
+    /// Tolerances of the scene.
     pub tolerances: Tolerances,
-    /// The first demand of the scene that was not met.
+    /// The first violated requirement of the scene.
     #[serde(flatten, with = "holding")]
     pub broken: Option<Broken>,
-    /// Conditions that were not checked, in words.
+    /// Names of conditions that were not checked.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unchecked: Vec<String>,
-    /// Result of the extended run; none without one.
+    /// Result of the extended run; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub later: Option<Later>,
-    /// Whether this width ended in the same bits as the error run.
+    /// Whether this width ended with the same bits as the error run.
     pub bits_equal: Option<bool>,
-    /// Fronts that the setting is on; only its fastest width is.
+    /// Fronts that include the setting, at its fastest width only.
     pub front: Fronts,
-    /// Why there is no result.
+    /// Divergence that ended the run.
     pub failure: Option<FailedAt>,
 }
 
-/// In files as in the columns `holds` and `failed_step`.
+/// File format: the columns `holds` and `failed_step`.
 mod holding {
     use super::{Broken, Mark};
     use serde::de::Error;
@@ -98,32 +98,32 @@ mod holding {
     }
 }
 
-/// A run to the horizon of its scene.
+/// Result of an extended run.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Later {
-    /// Steps of the run, if nothing ended it.
+    /// Planned number of steps.
     pub steps: u64,
-    /// The same (s).
+    /// Planned duration (s).
     pub seconds: f64,
-    /// The first demand that was not met.
+    /// The first violated requirement.
     #[serde(flatten, with = "holding")]
     pub broken: Option<Broken>,
-    /// Root mean square of the speed over the last second (m/s); none where nothing has to rest.
+    /// Root mean square of the speed over the last second (m/s); `None` if the scene need not come to rest.
     pub rest_speed_m_s: Option<f64>,
 }
 
 impl Record {
-    /// What two widths of one setting have in common, beside the scene.
+    /// Key that all widths of one setting of a scene share.
     pub fn setting(&self) -> (&'static str, Budget, Order, Impacts, Option<Swept>, &str) {
         (self.solver, self.budget, self.order, self.impacts, self.swept, &self.parameters)
     }
 
-    /// What a step costs (ns); infinite without a time.
+    /// Time of a step (ns), see [`Sample::cost_ns`]; infinite without a time.
     pub fn cost_ns(&self) -> f64 {
         self.sample.as_ref().map_or(f64::INFINITY, Sample::cost_ns)
     }
 
-    /// Failure after the end of the run, in words; none if there was none, or without an extended run.
+    /// Failure in the extended run, in words; `None` if it holds or there was no extended run.
     pub fn fails_later(&self) -> Option<String> {
         let later = self.later?;
         if let Some(broken) = later.broken {
@@ -134,45 +134,48 @@ impl Record {
         (speed > limit).then(|| format!("moves at {} after {:.0} s", si(speed, "m/s"), later.seconds))
     }
 
-    /// Whether it is within all tolerances at this accuracy, as far as is known: that it fails later counts.
+    /// Whether all known errors are within their tolerances at this accuracy. Failures in the extended run
+    /// count.
     pub fn is_good(&self, accuracy: Accuracy) -> bool {
         self.excess_at(accuracy) <= 1.0
     }
 
-    /// The word for a run that does not hold; none if it does.
+    /// Why the run does not hold; `None` if it holds.
     pub fn mark(&self) -> Option<Mark> {
         self.broken.map(|b| b.mark).or(self.failure.map(|_| Mark::BlewUp))
     }
 
-    /// Whether the run holds: only such settings are in fronts, slices, profiles and advice.
+    /// Whether the run holds. Fronts, slices, profiles and advice include only such settings.
     pub fn holds(&self) -> bool {
         self.mark().is_none()
     }
 
-    /// Whether most steps were too large for the solver's own method: errors and times are then those of its sweeps.
+    /// Whether most steps were too large for the solver's own method. Errors and times are then those of its
+    /// fallback sweeps.
     pub fn is_unsolved(&self) -> bool {
         self.sample.as_ref().is_some_and(|sample| sample.load.unsolved > 0.5)
     }
 
-    /// The error along an axis in its tolerance; none where there is no such error.
+    /// Error along an axis ÷ its tolerance; `None` if the record has no such error.
     pub fn in_tolerance(&self, axis: ErrorAxis) -> Option<f64> {
         self.in_tolerance_at(axis, Accuracy::Plausible)
     }
 
-    /// The same, in the tolerance at an accuracy.
+    /// The same, with the tolerance at an accuracy.
     pub fn in_tolerance_at(&self, axis: ErrorAxis, accuracy: Accuracy) -> Option<f64> {
         let tolerance = axis.tolerance(&self.tolerances)?.at(accuracy);
         let error = axis.of(self)?;
         Some(if error > 0.0 { error / tolerance } else { 0.0 })
     }
 
-    /// The largest of the errors in their tolerances for a plausible run, see [`Self::excess_at`].
+    /// The largest error ÷ tolerance for a plausible run, see [`Self::excess_at`].
     pub fn excess(&self) -> f64 {
         self.excess_at(Accuracy::Plausible)
     }
 
-    /// The largest of the errors in their tolerances: up to 1 is within all of them. Infinite for a
-    /// run that does not hold, that never came to what is known, or that other sweeps than the solver's own method solved.
+    /// The largest error ÷ tolerance: all errors are within their tolerances up to 1. Infinite for a run that
+    /// does not hold, that never reached the event of the reference value, or that fallback sweeps solved
+    /// instead of the solver's own method.
     pub fn excess_at(&self, accuracy: Accuracy) -> f64 {
         let known = |axis: &ErrorAxis| match axis {
             ErrorAxis::Truth => self.truth.is_some() && self.tolerances.truth.is_some(),
@@ -188,35 +191,35 @@ impl Record {
 /// Distance of a run from a reference value.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TruthError {
-    /// What is known.
+    /// Name of the quantity.
     #[serde(deserialize_with = "interned::read")]
     pub quantity: Name,
-    /// Of both numbers.
+    /// Unit of both numbers.
     #[serde(deserialize_with = "interned::read")]
     pub unit: Name,
-    /// The truth.
+    /// The reference value.
     pub expected: f64,
-    /// Distance to it; none where the run never came to it.
+    /// Distance to it; `None` if the run never reached the observed event.
     pub error: Option<f64>,
 }
 
 impl TruthError {
-    /// What the observer found; an infinite distance is none.
+    /// Result of the observer; an infinite distance becomes `None`.
     pub fn of(truth: &Truth) -> Self {
         let error = truth.observer.error().filter(|e| e.is_finite());
         TruthError { quantity: truth.quantity, unit: truth.unit, expected: truth.expected, error }
     }
 }
 
-/// Membership in the fronts of time against three errors.
+/// Membership in the Pareto fronts of time and each of three errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Fronts {
-    /// Against the deepest penetration.
+    /// Front of time and deepest penetration.
     pub penetration: bool,
-    /// Against the contact-law residual (root mean square).
+    /// Front of time and contact-law residual (root mean square).
     #[serde(rename = "residual")]
     pub law: bool,
-    /// Against the distance to the truth.
+    /// Front of time and distance to the reference value.
     #[serde(rename = "reference")]
     pub truth: bool,
 }
@@ -224,7 +227,7 @@ pub struct Fronts {
 /// Body and step at which a run diverged.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FailedAt {
-    /// Step, from 1.
+    /// Step, counted from 1.
     pub step: u64,
     /// Body index.
     pub body: usize,
@@ -234,7 +237,7 @@ pub struct FailedAt {
     /// The violated criterion.
     #[serde(default)]
     pub criterion: Criterion,
-    /// m/s or rad/s; none where it is not a finite number.
+    /// Speed in m/s or rad/s; `None` if it is not finite.
     pub speed: Option<f32>,
 }
 
@@ -252,8 +255,8 @@ impl std::fmt::Display for FailedAt {
     }
 }
 
-/// Marks, scene by scene and value by value of a sweep, the settings on each front, of those that hold. A setting is a solver, a budget and
-/// an order, at its fastest width.
+/// Marks the settings on each front, for each scene and each value of a sweep, among those that hold. A
+/// setting is a solver, a budget and an order, at its fastest width.
 pub fn mark_fronts(records: &mut [Record]) {
     for group in records.chunk_by_mut(|a, b| a.scene == b.scene && a.swept == b.swept) {
         let fastest: Vec<usize> =
@@ -292,7 +295,7 @@ pub(crate) mod tests {
     use crate::lab::scenes::{Scene, SceneBody, SceneShape};
     use crate::lab::study::sample::Load;
 
-    /// A record of `stack:2` by `pgs` in colors, with a time (µs) and a penetration (m).
+    /// A record of `stack:2` by `pgs` in colored order, with a time (µs) and a penetration (m).
     pub fn record(lanes: usize, substeps: u32, time: f64, penetration: f64) -> Record {
         let sample = Sample {
             mean_ns: 1e3 * time,
@@ -340,7 +343,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// Those of a box of a meter that nobody said has to rest.
+    /// Tolerances of a box of one meter in a scene that need not come to rest.
     pub fn tolerances() -> Tolerances {
         let body = SceneBody::dynamic([0.0, 0.0], SceneShape::rectangle(0.5, 0.5));
         Tolerances::standard(&Scene::new("x", vec![body]))
@@ -357,7 +360,7 @@ pub(crate) mod tests {
         Record { sample: None, errors: None, failure: Some(failure), ..record(lanes, 9, 0.0, 0.0) }
     }
 
-    /// A record of a run that has errors and a time, and fell.
+    /// A record with errors and a time whose run fell.
     pub fn fell(lanes: usize, substeps: u32, time: f64, penetration: f64) -> Record {
         let broken = Some(Broken { mark: Mark::Fell, step: 100 });
         Record { broken, ..record(lanes, substeps, time, penetration) }
@@ -407,13 +410,13 @@ pub(crate) mod tests {
             record(8, 2, 15.0, 0.1),
             record(8, 4, 40.0, 0.2),
             failed(8),
-            // The fastest and best of all, but it fell.
+            // The fastest and most accurate of all, but it fell.
             fell(8, 8, 1.0, 0.0),
         ];
         mark_fronts(&mut records);
         let marked: Vec<bool> = records.iter().map(|r| r.front.penetration).collect();
         assert_eq!(marked, [false, true, false, true, false, false, false]);
-        // All residuals are zero: only time counts. There is no truth.
+        // All residuals are zero, so only time counts. The scene has no reference value.
         let marked: Vec<bool> = records.iter().map(|r| r.front.law).collect();
         assert_eq!(marked, [false, true, false, false, false, false, false]);
         assert!(records.iter().all(|r| !r.front.truth));

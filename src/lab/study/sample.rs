@@ -1,9 +1,9 @@
-//! What is known of a setting that was timed: times, counts, and how they stand in files.
+//! Measurements of a timed setting: times, counts, and their file format.
 
 use crate::engine::clock::Phase;
 use crate::engine::world::StepCounts;
 
-/// Passes from which on the median over them knows what comes back.
+/// Number of passes at which the median over them starts to tell recurring spikes from single ones.
 const REPEATED: u32 = 3;
 
 /// Times and counts of one setting.
@@ -12,18 +12,19 @@ pub struct Sample {
     /// Mean over the steps of the run (ns).
     #[serde(rename = "mean_step_ns")]
     pub mean_ns: f64,
-    /// Median over them (ns).
+    /// Median over the steps (ns).
     #[serde(rename = "median_step_ns")]
     pub median_ns: f64,
-    /// The longest of them (ns).
+    /// Longest step (ns).
     #[serde(rename = "longest_step_ns")]
     pub worst_ns: f64,
-    /// Passes that it took part in.
+    /// Number of passes.
     pub rounds: u32,
-    /// Share of the time in which the thread waited for a processor (1); subtracted or left out.
+    /// Fraction of the time in which the thread waited for a processor (1). It was subtracted or left out.
     #[serde(rename = "waited_share")]
     pub waited: f64,
-    /// Median deviation of a repeat in its median (1); with one pass, of a step in the median step.
+    /// Median deviation of a repeat ÷ median step (1). With a single pass, the deviation of a step from the
+    /// median step.
     #[serde(rename = "noise_share")]
     pub noise: f64,
     /// Median deviation of a repeat (ns), see `noise`.
@@ -33,14 +34,14 @@ pub struct Sample {
     /// Median time of each phase (ns), in the order of [`Phase::ALL`].
     #[serde(with = "phases")]
     pub phase_ns: [f64; Phase::ALL.len()],
-    /// Median time of all sweeps over the rows that they solve (ns).
+    /// Median time of all sweeps ÷ number of rows that they solve (ns).
     pub row_sweep_ns: f64,
-    /// Median time of a fixed loop between the rounds (ns): what the machine was worth just then.
+    /// Median time of a fixed loop before each round (ns): the speed of the machine at that time.
     pub yardstick_ns: f64,
     /// Averages over the steps.
     pub load: Load,
-    /// Time of each block (ns per step) by pass, for comparing block by block; not a number where
-    /// the setting took no part, or waited.
+    /// Time of each block (ns per step) by pass, for comparing block by block. NaN for blocks in which the
+    /// setting was not timed or had to wait.
     #[serde(with = "blocks")]
     pub blocks_ns: Vec<Vec<f64>>,
     /// Hash of the final state.
@@ -49,19 +50,19 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// What a step costs (ns): the mean over the run, where enough passes tell spikes of the solver from those of
-    /// the machine, and else the median.
+    /// Time of a step (ns): the mean over the run if there are enough passes to tell spikes of the solver
+    /// from those of the machine, otherwise the median.
     pub fn cost_ns(&self) -> f64 {
         if self.rounds >= REPEATED { self.mean_ns } else { self.median_ns }
     }
 
-    /// Mean over median: 1 without spikes, and where nobody can tell.
+    /// Mean ÷ median: 1 without spikes, or with too few passes to tell.
     pub fn spikes(&self) -> f64 {
         if self.median_ns > 0.0 { self.cost_ns() / self.median_ns } else { 1.0 }
     }
 }
 
-/// Phases in files: by name.
+/// File format of phases: by name.
 mod phases {
     use crate::engine::clock::Phase;
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -80,7 +81,7 @@ mod phases {
     }
 }
 
-/// Blocks in files: tenths of nanoseconds, and what is not a number as null.
+/// File format of blocks: rounded to tenths of nanoseconds, with null for NaN.
 mod blocks {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -97,7 +98,7 @@ mod blocks {
     }
 }
 
-/// What a step has to do, averaged over a run.
+/// Work of a step, averaged over a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Load {
     /// Contacts with at least one point.
@@ -106,15 +107,15 @@ pub struct Load {
     pub rows: f64,
     /// Sweeps over the constraints.
     pub sweeps: f64,
-    /// Most colors of any step.
+    /// Largest number of colors in any step.
     pub colors: usize,
     /// Contacts solved serially because colors ran out.
     pub overflow: f64,
-    /// Share of lanes that hold a contact, in [0, 1].
+    /// Fraction of lanes that hold a contact, in [0, 1].
     pub occupancy: f64,
     /// Prepared constraint records (bytes per contact, empty lanes left out).
     pub bytes_per_contact: f64,
-    /// Share of steps that were too large for the solver's own method.
+    /// Fraction of steps that were too large for the solver's own method.
     #[serde(default)]
     pub unsolved: f64,
 }
@@ -157,12 +158,12 @@ impl LoadSum {
     }
 }
 
-/// The median, 0 of nothing.
+/// The median; 0 for an empty list.
 pub fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
 }
 
-/// The `p`-quantile with linear interpolation, 0 of nothing.
+/// The `p`-quantile with linear interpolation; 0 for an empty list.
 pub fn quantile(values: &[f64], p: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

@@ -1,11 +1,11 @@
-//! Savings from specialization: what the kernels of a scene gain by leaving out features that the
-//! scene does not have.
+//! Savings from specialization: the time and memory that kernels save by leaving out features that a scene
+//! lacks.
 //!
-//! A scene's features choose the kernel. Here each feature that a scene is without is forced on,
-//! alone and all together, and interleaved timing tells what that would have cost. Since few scenes
-//! are without friction, each one also runs frictionless, with every friction coefficient zero.
+//! The features of a scene select the kernel. Here each feature that a scene lacks is forced on, alone and
+//! all together, and interleaved timing measures the extra cost. Since few scenes lack friction, each scene
+//! also runs frictionless, with every friction coefficient zero.
 //!
-//! Scenes of few contacts are left out: what their sweeps cost is the cost of starting them.
+//! Scenes with few contacts are left out, because the fixed cost of starting a sweep dominates there.
 
 use super::interleave::time_in_turns;
 use super::sample::Sample;
@@ -17,30 +17,30 @@ use crate::engine::world::{Divergence, Settings};
 use crate::lab::error::Error;
 use crate::lab::scenes::Scene;
 
-/// What leaving out one feature saves on a scene that does not have it.
+/// Savings from leaving out one feature on a scene that lacks it.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Saving {
-    /// Name with size.
+    /// Scene name with its size.
     pub scene: String,
     /// Name of the solver.
     pub solver: &'static str,
     /// Lanes per instruction.
     pub lanes: usize,
-    /// What was left out; `all` for everything.
+    /// The feature that was left out; `all` for all of them.
     pub feature: &'static str,
-    /// Prepared records with the features of the scene alone (bytes per contact).
+    /// Size of prepared records with only the features of the scene (bytes per contact).
     pub bytes: f64,
-    /// What leaving this one out saves (bytes per contact).
+    /// Size saved by leaving this feature out (bytes per contact).
     pub bytes_saved: f64,
-    /// Passes over constraints with the features of the scene alone (ns per contact and sweep).
+    /// Time of passes over constraints with only the features of the scene (ns per contact and sweep).
     pub ns: f64,
-    /// What leaving this one out saves (ns per contact and sweep); negative if it costs.
+    /// Time saved by leaving this feature out (ns per contact and sweep); negative if it takes longer.
     pub ns_saved: f64,
-    /// Whether both ended in the same bits.
+    /// Whether both runs ended with the same bits.
     pub bits_equal: bool,
 }
 
-/// Names of features and what forces them on.
+/// Names of features, and the flags that force them on.
 const FEATURES: [(&str, Features); 4] = [
     ("friction", Features { friction: true, ..Features::NONE }),
     ("second point", Features { two_points: true, ..Features::NONE }),
@@ -48,10 +48,10 @@ const FEATURES: [(&str, Features); 4] = [
     ("restitution", Features { restitution: true, ..Features::NONE }),
 ];
 
-/// Contacts that a scene must have on average to be worth a line.
+/// Minimum average number of contacts of a scene to be included.
 const FEWEST_CONTACTS: f64 = 100.0;
 
-/// The scene with every friction coefficient zero.
+/// A copy of the scene with every friction coefficient zero.
 fn frictionless(scene: &Scene) -> Scene {
     let mut copy = scene.clone();
     copy.name += " frictionless";
@@ -59,8 +59,8 @@ fn frictionless(scene: &Scene) -> Scene {
     copy
 }
 
-/// For every scene of the plan what each feature that it is without would cost, with every solver of
-/// the plan at its standard budget, and with the plan's widest lanes.
+/// For every scene of the plan, the cost of each feature that it lacks, with every solver of the plan at its
+/// standard budget and with the plan's widest lanes.
 pub fn savings(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Vec<Saving>, Error> {
     plan.check()?;
     let width = plan.widths.iter().copied().max().unwrap_or(native_width());
@@ -84,7 +84,7 @@ pub fn savings(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result
     Ok(savings)
 }
 
-/// The savings on one scene; none if it has every feature, or few contacts.
+/// The savings on one scene; empty if it has every feature, or few contacts.
 fn of_scene(plan: &StudyPlan, scene: &Scene, base: Settings) -> Result<Vec<Saving>, Error> {
     let has = scene.build(base.clone())?.features();
     let lacks = |feature: &Features| has.union(*feature) != has;
@@ -120,7 +120,7 @@ fn of_scene(plan: &StudyPlan, scene: &Scene, base: Settings) -> Result<Vec<Savin
     Ok(forced.iter().zip(&samples[1..]).filter_map(saving).collect())
 }
 
-/// ns per contact and sweep, from the median times of the phases that sweep.
+/// Time per contact and sweep (ns), from the median times of the phases that sweep.
 fn per_contact(sample: &Sample) -> f64 {
     let sweeps = Phase::ALL.iter().zip(sample.phase_ns).filter(|(phase, _)| phase.is_sweep());
     let ns: f64 = sweeps.map(|(_, ns)| ns).sum();

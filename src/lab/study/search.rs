@@ -1,21 +1,24 @@
-//! Which settings of a solver are worth timing on a scene: one rule, and one effort, for every solver.
+//! Search for the settings of a solver that are worth timing on a scene, with one rule and the same effort
+//! for every solver.
 //!
-//! Candidates are [`SUBSTEPS`] × [`SWEEPS`] (at most [`MOST_SWEEPS`] sweeps in a step) at the solver's standard
-//! parameters, and further ones drawn from other values of its [stiffness](STIFFNESS), or of what its row lists, up to
-//! [`MOST`] in all. They are judged by errors alone, so no clock is read and all cores may work:
+//! Candidates are [`SUBSTEPS`] × [`SWEEPS`] (at most [`MOST_SWEEPS`] sweeps in a step) at the solver's
+//! standard parameters. Further ones are drawn at random from other values of its [stiffness](STIFFNESS), or
+//! of the trial values in its row, up to [`MOST`] in all. Candidates are compared by errors alone, so no
+//! clock is read and all cores can work:
 //!
 //! ```text
 //! 54 candidates ─ 1/16 of the run ─► a quarter ─ 1/4 of the run ─► 6 ─ whole run ─► at most 3, which a study times
 //! ```
 //!
-//! A candidate has an excess over the tolerances of the scene and a *work*: sweeps and substeps of a mean step, as the
-//! solver counts them. Those stay first that no other one beats with as little work and less excess, then those that only
-//! these beat (successive halving of Jamieson and Talwalkar, "Non-stochastic best arm identification and hyperparameter
-//! optimization", 2016, by non-dominated fronts instead of one loss). Nobody is dropped who is not beaten: where nothing
-//! has touched yet, short runs tell nothing. Of the last ones a study times the least work that is plausible, that is
-//! tight and that is exact, each of which has to stand for a minute where the scene rests, and, where these are fewer
-//! than three, the next ones that are plausible. Where none of the last is plausible, the dropped ones run whole as
-//! well, until one is: no solver fails on a scene by a candidate that only short runs have seen.
+//! A candidate has an excess over the tolerances of the scene and a *work*: the sweeps and substeps of an
+//! average step, as counted by the solver. Candidates are sorted by non-dominated fronts: a candidate beats
+//! another one with at most as much work and less excess. This is successive halving (Jamieson and Talwalkar,
+//! "Non-stochastic best arm identification and hyperparameter optimization", 2016), with fronts instead of
+//! one loss. Unbeaten candidates are never dropped: before the first contact, short runs show no difference.
+//! Of the last candidates, a study times those with the least work that are plausible, tight and exact. Each
+//! of these must stand for a minute if the scene should come to rest. If they are fewer than three, the next
+//! plausible ones are added. If none of the last candidates is plausible, the dropped ones get whole runs as
+//! well, until one is. So no solver fails on a scene because of candidates that only had short runs.
 
 use super::found::{Found, FoundBudgets, TunedBudget};
 use super::horizon::{in_parallel, later};
@@ -35,13 +38,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Substeps to try.
 pub const SUBSTEPS: [u32; 5] = [1, 2, 4, 8, 14];
-/// Sweeps per substep to try; sweeps of other kinds in the proportion of the standard budget.
+/// Sweeps per substep to try. Other kinds of sweeps keep their proportion in the standard budget.
 pub const SWEEPS: [u32; 6] = [1, 2, 4, 8, 16, 32];
-/// Most of them in a step.
+/// Maximum number of sweeps in a step.
 pub const MOST_SWEEPS: u32 = 128;
-/// Most candidates of a solver.
+/// Maximum number of candidates of a solver.
 pub const MOST: usize = 54;
-/// Values of stiffness to try beside the standard one, where the solver's row lists none.
+/// Stiffness values to try besides the standard one, if the solver's row lists none.
 pub const STIFFNESS: [(&str, &[f32]); 4] = [
     ("baumgarte", &[0.1, 0.8]),
     ("correction", &[0.4, 0.8]),
@@ -49,13 +52,13 @@ pub const STIFFNESS: [(&str, &[f32]); 4] = [
     ("beta", &[1e4, 1e6]),
 ];
 
-/// Parts of a run after which a quarter stays.
+/// Fractions of a run (as divisors) after which a quarter of the candidates remains.
 const PARTS: [u32; 2] = [16, 4];
-/// Candidates that run whole at least, and settings of them that are timed.
+/// Minimum number of candidates with whole runs, and maximum number of timed settings.
 const LAST: usize = 6;
 const TIMED: usize = 3;
 
-/// The rule in a sentence, for pages.
+/// The rule in one sentence, for pages.
 pub fn rule() -> String {
     let list = |values: &[u32]| values.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
     format!(
@@ -66,7 +69,7 @@ pub fn rule() -> String {
     )
 }
 
-/// Searches for every solver of the plan on each of its scenes, on all cores.
+/// Searches for settings of every solver of the plan on each of its scenes, on all cores.
 ///
 /// Errors: as [`StudyPlan::check`].
 pub fn search(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Found, Error> {
@@ -94,7 +97,8 @@ pub fn search(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<
     Ok(Found { entries })
 }
 
-/// The candidates of a solver in steps of `dt` (s): the standard parameters first, then the others as they are drawn.
+/// The candidates of a solver in steps of `dt` (s): those with standard parameters first, then the others as
+/// drawn.
 pub fn candidates(solver: &Variant, dt: f64) -> Vec<TunedBudget> {
     let (mut standard, mut others) = (Vec::new(), Vec::new());
     for budget in budgets(solver) {
@@ -114,14 +118,14 @@ pub fn candidates(solver: &Variant, dt: f64) -> Vec<TunedBudget> {
     standard
 }
 
-/// The budgets of the grid, each once.
+/// The distinct budgets of the grid.
 fn budgets(solver: &Variant) -> Vec<Budget> {
     let standard = solver.budget;
     let unit = if solver.uses.velocity { standard.velocity_iterations } else { standard.position_iterations };
     let mut budgets: Vec<Budget> = Vec::new();
     for substeps in SUBSTEPS {
         for sweeps in SWEEPS.into_iter().filter(|sweeps| substeps * sweeps <= MOST_SWEEPS) {
-            // As many of its other sweeps as its standard budget has to one of these, and one at least.
+            // Other sweeps keep their ratio in the standard budget, with at least one each.
             let scaled = |own: u32| (own * sweeps / unit.max(1)).max(own.min(1));
             let budget = Budget {
                 substeps,
@@ -137,8 +141,8 @@ fn budgets(solver: &Variant) -> Vec<Budget> {
     budgets
 }
 
-/// The standard parameters of a solver, and then every combination of `trials` of them, in substeps of `h` (s),
-/// without stiffnesses that come to the same.
+/// The standard parameters of a solver, then every combination of their `trials`, in substeps of `h` (s).
+/// Stiffness values with the same effect count once.
 pub fn parameters<'a>(solver: &Variant, h: f32, trials: impl Fn(&Parameter) -> &'a [f32]) -> Vec<Parameters> {
     let mut all = vec![solver.defaults()];
     for (place, parameter) in solver.parameters.iter().enumerate() {
@@ -160,7 +164,7 @@ pub fn parameters<'a>(solver: &Variant, h: f32, trials: impl Fn(&Parameter) -> &
     kept
 }
 
-/// A solver on a scene.
+/// The search for one solver on one scene.
 struct SearchJob<'a> {
     plan: &'a StudyPlan,
     name: &'a str,
@@ -168,16 +172,16 @@ struct SearchJob<'a> {
     impacts: Impacts,
 }
 
-/// A candidate after a run.
+/// A candidate with the results of a run.
 struct SearchTrial {
     candidate: TunedBudget,
     record: Record,
-    /// Sweeps and substeps of a mean step.
+    /// Sweeps plus substeps of an average step.
     work: f64,
 }
 
 impl SearchTrial {
-    /// Excess over the strictest tolerances; what is within them is as good as anything.
+    /// Excess over the strictest tolerances. All values within them count as equal.
     fn excess(&self) -> f64 {
         self.record.excess_at(Accuracy::Exact).max(1.0)
     }
@@ -216,7 +220,7 @@ impl SearchJob<'_> {
             } else if let Some(next) = dropped.next().filter(|_| chosen.is_empty()) {
                 trials.extend(self.judged(&[next], self.plan.steps)?);
             } else if chosen.is_empty() {
-                // The nearest; of those that do not even hold the standard budget, which a reader expects.
+                // The nearest candidate. If none holds, the standard budget, which a reader expects.
                 let nearest = trials.iter().min_by(|a, b| a.record.excess().total_cmp(&b.record.excess()));
                 let nearest = nearest.filter(|t| t.record.excess().is_finite()).map(|t| t.candidate);
                 let (budget, parameters) = (self.solver.budget, self.solver.defaults());
@@ -245,7 +249,7 @@ impl SearchJob<'_> {
         }
     }
 
-    /// Colored order at any width gives the same bits; the plan may have natural order alone.
+    /// All widths of colored order give the same bits. The plan may contain natural order only.
     fn order(&self) -> (Order, LaneWidth) {
         match self.plan.orders[..] {
             [order] if order.is_serial() => (order, LaneWidth::W1),
@@ -258,7 +262,7 @@ impl SearchJob<'_> {
         later(&self.plan.open(self.name)?, settings(self.plan, &self.cell(candidate), order, width))
     }
 
-    /// Runs candidates for so many steps, or for those of the scene.
+    /// Runs candidates for `steps` steps, or for those of the scene.
     fn judged(&self, list: &[TunedBudget], steps: Option<u32>) -> Result<Vec<SearchTrial>, Error> {
         let plan = StudyPlan { steps, ..self.plan.clone() };
         let (order, width) = self.order();
@@ -282,7 +286,8 @@ impl SearchJob<'_> {
     }
 }
 
-/// The places of the settings to time: at each accuracy the least work, and then the next plausible ones; the least work first.
+/// Indices of the settings to time: the least work at each accuracy, then the next plausible ones. Sorted by
+/// work.
 fn choose(trials: &[SearchTrial]) -> Vec<usize> {
     let mut sorted: Vec<usize> = (0..trials.len()).filter(|&i| trials[i].is_plausible()).collect();
     sorted.sort_by(|&a, &b| {
@@ -301,8 +306,9 @@ fn choose(trials: &[SearchTrial]) -> Vec<usize> {
     sorted
 }
 
-/// Places of points (work, excess): those that no other one beats with as little work and less excess, then those that
-/// only these beat, and so on; of one front the least excess first. Infinite ones come last, by their work.
+/// Indices of points (work, excess) by non-dominated fronts: first those that no other point beats with at
+/// most as much work and less excess, then those that only the first front beats, and so on. Within a front,
+/// the least excess comes first. Points with an infinite excess come last, sorted by work.
 fn by_fronts(points: &[[f64; 2]]) -> Vec<Vec<usize>> {
     let (mut left, mut failed): (Vec<usize>, Vec<usize>) =
         (0..points.len()).partition(|&i| points[i][1].is_finite());
@@ -318,7 +324,7 @@ fn by_fronts(points: &[[f64; 2]]) -> Vec<Vec<usize>> {
         left = rest;
     }
     failed.sort_by(|a, b| order(key(a, [0, 1]), key(b, [0, 1])));
-    // All alike, and beaten by whatever holds.
+    // Candidates with an infinite excess form one last front, beaten by any finite one.
     fronts.extend((!fronts.is_empty() && !failed.is_empty()).then_some(failed.clone()));
     if fronts.is_empty() {
         fronts = failed.into_iter().map(|i| vec![i]).collect();
@@ -372,7 +378,7 @@ mod tests {
         let infinite = f64::INFINITY;
         let points =
             [[1.0, 9.0], [2.0, 9.0], [3.0, 2.0], [1.0, infinite], [4.0, 3.0], [9.0, 1.0], [0.5, infinite]];
-        // 1 has more work than 0 and no less excess, but no more either.
+        // Point 1 has more work than point 0 but the same excess, so it is not beaten.
         assert_eq!(by_fronts(&points), [vec![5, 2, 0, 1], vec![4], vec![6, 3]]);
         assert_eq!(by_fronts(&points[6..]), [[0]]);
         assert!(by_fronts(&[]).is_empty());

@@ -1,33 +1,33 @@
-//! All solvers compared in equal time, and to equal error: of each the best setting that takes
-//! at most that time, or the fastest whose error is at most that large.
+//! Comparison of all solvers at equal time and at equal error. For each solver: the best setting within that
+//! time, or the fastest one within that error.
 
 use super::Record;
 use super::compare::compare;
 use super::curve::{Curve, ErrorAxis, SettingSample, curves};
 
-/// Every solver of a scene at one time or at one error.
+/// All solvers on a scene at one given time or error.
 #[derive(Clone, Debug)]
 pub struct Slice<'a> {
     /// Name of the scene.
     pub scene: &'a str,
-    /// What is given: a time (ns) or an error.
+    /// The given time (ns) or error.
     pub at: f64,
     /// Unit of the error.
     pub unit: &'static str,
-    /// Solver, and its setting; none where all take longer, or have a larger error.
+    /// For each solver, its setting; `None` if all its settings take longer or have a larger error.
     pub values: Vec<(&'static str, Option<SettingSample<'a>>)>,
-    /// The solvers that nobody beats: in equal time those of least error, to equal error the
-    /// fastest and those that [tie](compare) with it.
+    /// The best solvers: at equal time those with the smallest error, at equal error the fastest one and
+    /// those that [tie](compare) with it.
     pub best: Vec<&'static str>,
 }
 
-/// The errors of the scene in equal time; none if no curve has an error of this kind.
+/// The errors on the scene at equal time; `None` if no curve has an error of this kind.
 pub fn equal_time(records: &[Record], axis: ErrorAxis) -> Option<Slice<'_>> {
     let best = |least: &SettingSample, other: &SettingSample| other.error <= least.error;
     slice(records, axis, |s| s.time, Curve::best_within, |s| s.error, best)
 }
 
-/// The times to equal error.
+/// The times at equal error.
 pub fn equal_error(records: &[Record], axis: ErrorAxis) -> Option<Slice<'_>> {
     let best = |least: &SettingSample, other: &SettingSample| {
         let samples = least.record.sample.as_ref().zip(other.record.sample.as_ref());
@@ -45,7 +45,7 @@ fn slice<'a>(
     as_good: impl Fn(&SettingSample, &SettingSample) -> bool,
 ) -> Option<Slice<'a>> {
     let curves = curves(records, axis);
-    // What has no logarithm has no place between round numbers.
+    // Ranges without a logarithm are skipped.
     let usable = |[a, b]: &[f64; 2]| *a > 0.0 && b.is_finite();
     let ranges: Vec<[f64; 2]> = curves.iter().filter_map(|c| range(c, given)).filter(usable).collect();
     let at = common(&ranges)?;
@@ -56,23 +56,23 @@ fn slice<'a>(
     Some(Slice { scene: &records.first()?.scene, at, unit: axis.unit(records), values, best })
 }
 
-/// From the least to the largest time or error of a solver's settings.
+/// The range of the times or errors of a solver's settings.
 fn range(curve: &Curve, given: fn(&SettingSample) -> f64) -> Option<[f64; 2]> {
     let all = || curve.samples.iter().map(given);
     let least = all().min_by(f64::total_cmp)?;
     Some([least, all().fold(least, f64::max)])
 }
 
-/// A round number that lies in as many of the ranges as any: of those the roundest, and of
-/// equally round ones the one nearest to the middle of all ranges. Where no number of two digits
-/// lies in any range, the middle of the first.
+/// A round number that lies in as many of the ranges as possible. Among these, the roundest one, and among
+/// equally round ones the one nearest to the middle of all ranges. If no number of two digits lies in any
+/// range, the middle of the first one.
 fn common(ranges: &[[f64; 2]]) -> Option<f64> {
     let first = ranges.first()?;
     let middle = ranges.iter().map(|[a, b]| 0.5 * (a * b).ln()).sum::<f64>() / ranges.len() as f64;
     let ends = || ranges.iter().flatten();
     let low = ends().copied().fold(f64::INFINITY, f64::min).log10().floor() as i32;
     let high = ends().copied().fold(0.0, f64::max).log10().ceil() as i32;
-    // 1, 2, 5 before other digits, one digit before two.
+    // Prefers 1, 2, 5 to other digits, and one digit to two.
     let roundness = |n: i32| match n {
         10 | 20 | 50 => 2,
         n if n % 10 == 0 => 1,
@@ -100,11 +100,11 @@ mod tests {
     #[test]
     fn the_cut_is_round_and_meets_the_most_curves() {
         let near = |at: Option<f64>, expected: f64| (at.unwrap() / expected - 1.0).abs() < 1e-12;
-        // 10 to 20 lies in all three; 20 is as round as 10, and nearer to the middle.
+        // 10 to 20 lies in all three ranges. 20 is as round as 10 and nearer to the middle.
         assert!(near(common(&[[8.0, 90.0], [3.0, 20.0], [10.0, 40.0]]), 20.0));
-        // Only the first two meet.
+        // Only the first two ranges overlap.
         assert!(near(common(&[[8.0, 90.0], [40.0, 60.0], [700.0, 800.0]]), 50.0));
-        // No two digits lie in between: the middle.
+        // No number of two digits lies in the range, so its middle is used.
         assert!(near(common(&[[1.31e-4, 1.39e-4]]), (1.31_f64 * 1.39).sqrt() * 1e-4));
         assert_eq!(common(&[]), None);
     }
@@ -119,18 +119,18 @@ mod tests {
             Record { solver: "projection", ..record(8, 1, 80.0, 3.0) },
         ];
         let at = |s: &(&'static str, Option<SettingSample>)| s.1.map(|s| (s.time / 1e3, s.error));
-        // 20 µs: the second setting of pgs is not done, and projection has none that is. That of
-        // soft_step was done long ago.
+        // 20 µs: the second setting of pgs takes longer, and projection has none within that time. The
+        // setting of soft_step takes less.
         let time = equal_time(&records, ErrorAxis::Penetration).unwrap();
         assert_eq!((time.scene, time.unit), ("stack:2", "m"));
         assert!((12e3..40e3).contains(&time.at), "{}", time.at);
         let values: Vec<_> = time.values.iter().map(at).collect();
         assert_eq!(values, [Some((10.0, 0.5)), Some((12.0, 0.25)), None]);
         assert_eq!(time.best, ["soft_step"]);
-        // A time that was not measured is no place for a cut.
+        // An unmeasured time is never the given time.
         let unmeasured = [records[0].clone(), record(8, 4, 0.0, 0.25), other(0.0, 0.125)];
         assert!(equal_time(&unmeasured, ErrorAxis::Penetration).is_none_or(|slice| slice.at > 0.0));
-        // To an error of 0.1 to 0.25, or less: a setting is as good as any larger error.
+        // An error of 0.1 to 0.25: a setting with a smaller error counts as well.
         let error = equal_error(&records[..3], ErrorAxis::Penetration).unwrap();
         let values: Vec<_> = error.values.iter().map(at).collect();
         assert_eq!((values[0], error.values.len()), (Some((40.0, 0.03125)), 2), "{}", error.at);
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn a_setting_that_is_done_early_answers_later() {
-        // The pyramid of 40 rows in equal time: 385 µs and 7.0 mm are better than 500 µs and 20.3 mm.
+        // The pyramid of 40 rows at equal time: 385 µs and 7.0 mm are better than 500 µs and 20.3 mm.
         let slow = |substeps, time, error| record(8, substeps, time, error);
         let soft = |substeps, time, error| Record { solver: "soft_step", ..record(8, substeps, time, error) };
         let records = [

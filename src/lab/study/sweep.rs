@@ -1,8 +1,8 @@
-//! A sweep: one quantity takes several values, and everything else stays as it is.
+//! A sweep: one quantity takes several values, and everything else stays the same.
 //!
-//! The quantity belongs to solvers (a parameter), to the budget, or to the scene. Solvers that do not have
-//! it take no part. Where the step changes, runs keep their duration; where friction changes, the scene has
-//! no reference value, because those of the catalog hold for a scene's own friction.
+//! The quantity belongs to solvers (a parameter), to the budget, or to the scene. Solvers without the
+//! quantity are left out. If the step length changes, runs keep their duration. If friction changes, the
+//! scene has no reference value, because those of the catalog hold for the scene's own friction.
 
 use super::budget::{self, BudgetGrid};
 use crate::engine::params::{Budget, Parameters};
@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 
-/// Most values of a sweep.
+/// Maximum number of values in a sweep.
 const MOST: usize = 100;
 
 /// Quantities that a sweep can vary besides solver parameters: name, unit, owner.
@@ -31,14 +31,14 @@ const QUANTITIES: [(&str, &str, QuantityKind); 8] = [
     ("mass_ratio", "", QuantityKind::MassRatio),
 ];
 
-/// Whose quantity it is.
+/// Owner of a quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum QuantityKind {
     /// A parameter of solvers.
     Parameter,
     /// [`Budget::substeps`]
     Substeps,
-    /// Velocity sweeps; position sweeps of solvers that have no others.
+    /// Velocity sweeps; position sweeps for solvers without velocity sweeps.
     Iterations,
     /// [`Budget::velocity_iterations`]
     Velocity,
@@ -46,22 +46,22 @@ enum QuantityKind {
     Relax,
     /// [`Budget::position_iterations`]
     Position,
-    /// Step of the scene (s).
+    /// Step length of the scene (s).
     Dt,
     /// Friction coefficient of every shape (1).
     Friction,
-    /// Size of a scene that is one mass on another.
+    /// Size of a scene with one mass on another.
     MassRatio,
 }
 
 /// The quantity and its values, ascending.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct QuantitySweep {
-    /// In `snake_case`.
+    /// Name in `snake_case`.
     pub name: &'static str,
-    /// Empty for a pure number.
+    /// Unit; empty for a pure number.
     pub unit: &'static str,
-    /// Each once.
+    /// The distinct values.
     pub values: Vec<f64>,
     #[serde(skip)]
     kind: QuantityKind,
@@ -76,7 +76,7 @@ pub struct Swept {
     /// Its unit; empty for a pure number.
     #[serde(deserialize_with = "interned::read")]
     pub unit: Name,
-    /// In that unit.
+    /// Value in that unit.
     pub value: f64,
 }
 
@@ -111,7 +111,7 @@ impl FromStr for QuantitySweep {
         if values.trim().is_empty() {
             return Err(refuse(format!("the list of values of {name} is empty")));
         }
-        // A plain number is in the quantity's own unit.
+        // A number without a unit is in the quantity's own unit.
         let read = |value: &str| {
             let plain = value.trim().parse::<f64>().is_ok();
             quantity("sweep", value, if plain { "" } else { unit })
@@ -131,12 +131,12 @@ impl FromStr for QuantitySweep {
 }
 
 impl QuantitySweep {
-    /// One after the other.
+    /// The points of the sweep, in order.
     pub fn points(&self) -> impl Iterator<Item = Swept> {
         self.values.iter().map(|&value| Swept { name: self.name, unit: self.unit, value })
     }
 
-    /// Whether the quantity is one that this solver has, or is the scene's.
+    /// Whether this solver has the quantity, or the scene does.
     pub fn concerns(&self, variant: &Variant) -> bool {
         match self.kind {
             QuantityKind::Parameter => variant.parameter(self.name).is_ok(),
@@ -150,9 +150,9 @@ impl QuantitySweep {
         }
     }
 
-    /// The budget grid of a sweep: a solver's own budget, or the one given.
+    /// Checks the budget grid of a sweep: a solver's own budget, or a given one.
     ///
-    /// Errors: a list of several values, or of the swept quantity.
+    /// Errors: a list of several values, or a list for the swept quantity.
     pub fn check_grid(&self, grid: &BudgetGrid) -> Result<(), Error> {
         let lists = [
             ("substeps", &grid.substeps, &[QuantityKind::Substeps][..]),
@@ -176,7 +176,7 @@ impl QuantitySweep {
         Ok(())
     }
 
-    /// `budget` at this value. Errors: one that the solver cannot work with.
+    /// `budget` with this value. Errors: a budget that the solver cannot run with.
     pub fn budget(&self, value: f64, budget: Budget, variant: &Variant) -> Result<Budget, Error> {
         let count = value as u32;
         let changed = match self.kind {
@@ -196,7 +196,7 @@ impl QuantitySweep {
         Ok(changed)
     }
 
-    /// `parameters` at this value. Errors: a value out of the parameter's range.
+    /// Sets this value in `parameters`. Errors: a value out of the parameter's range.
     pub fn set(&self, value: f64, parameters: &mut Parameters, variant: &Variant) -> Result<(), Error> {
         match self.kind {
             QuantityKind::Parameter => Ok(variant.set(parameters, self.name, value as f32)?),
@@ -204,7 +204,7 @@ impl QuantitySweep {
         }
     }
 
-    /// The name that opens the scene at this value. Errors: a scene that does not have the quantity.
+    /// The name that opens the scene at this value. Errors: a scene without the quantity.
     pub fn scene_name(&self, value: f64, name: &str) -> Result<String, Error> {
         if self.kind != QuantityKind::MassRatio {
             return Ok(name.to_string());
@@ -220,13 +220,13 @@ impl QuantitySweep {
         Ok(format!("{stem}:{value}"))
     }
 
-    /// Length of a step (s) at this value, where it is what varies.
+    /// Step length (s) at this value; `None` unless the step length is swept.
     pub fn dt(&self, value: f64) -> Option<f64> {
         (self.kind == QuantityKind::Dt).then_some(value)
     }
 
-    /// The scene at this value, as it is compared with those at others: under one name, and with what is
-    /// known about it where that still holds.
+    /// The scene at this value, under the same name as at the others. The reference value is kept only if it
+    /// still holds.
     pub fn adapt(&self, value: f64, mut loaded: Loaded) -> Loaded {
         match self.kind {
             QuantityKind::Friction => {
@@ -244,8 +244,8 @@ impl QuantitySweep {
         loaded
     }
 
-    /// Refuses what nothing can be swept with: no solver that has the quantity, the same parameter set, a
-    /// value out of its range.
+    /// Rejects an impossible sweep: no solver has the quantity, the same parameter is also set, or a value is
+    /// out of its range.
     pub fn check(
         &self,
         solvers: &[&'static Variant],
@@ -270,7 +270,7 @@ impl QuantitySweep {
         Ok(())
     }
 
-    /// As on the command line: `contact_hertz=15,30,60`.
+    /// The sweep as written on the command line: `contact_hertz=15,30,60`.
     pub fn words(&self) -> String {
         let values: Vec<String> = self.values.iter().map(f64::to_string).collect();
         format!("{}={}", self.name, values.join(","))

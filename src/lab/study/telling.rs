@@ -1,4 +1,4 @@
-//! The scene that tells solvers apart the most, and recordings of it.
+//! Recordings of the scene on which solvers differ most.
 
 use super::answer::Answer;
 use super::curve::solvers_of;
@@ -13,15 +13,15 @@ use crate::lab::scenes::holds::HoldWatch;
 use crate::lab::units::lanes;
 use std::cmp::Reverse;
 
-/// Runs side by side.
+/// Maximum number of runs shown side by side.
 const MOST: usize = 4;
-/// A page should open at once: bodies of a scene that is played, and frames of a recording.
+/// Limits that let a page open at once: bodies of a replayed scene, and frames of a recording.
 const LARGEST: usize = 300;
 const FRAMES: u32 = 300;
 
-/// The runs to play (none of a sweep, whose scenes differ): of the scene on which as many solvers hold as fail, the cheapest setting within
-/// tolerance or nearest to it, then those that broke, then others that hold; each of another solver.
-/// Empty where nothing was run in colors on a small scene.
+/// The runs to replay, from the scene with the largest minimum of holding and failing solvers. First the
+/// cheapest setting within tolerance, or the one nearest to it, then runs that broke, then others that hold;
+/// each of another solver. Empty in a sweep, whose scenes differ, and without colored runs on a small scene.
 pub fn telling(records: &[Record]) -> Vec<&Record> {
     if records.iter().any(|r| r.swept.is_some()) {
         return Vec::new();
@@ -49,7 +49,7 @@ pub fn telling(records: &[Record]) -> Vec<&Record> {
         broken.sort_by_key(|r| (r.broken.map_or(0, |b| b.step), Reverse(r.lanes)));
         let mut others: Vec<&Record> = colored().filter(|r| r.holds()).collect();
         others.sort_by(|a, b| a.excess().total_cmp(&b.excess()).then(b.lanes.cmp(&a.lanes)));
-        // The worst, the next worst, and then who holds best.
+        // The earliest failures first, then the most accurate of those that hold.
         for (list, limit) in [(&broken, MOST - 1), (&others, MOST), (&broken, MOST)] {
             for record in list {
                 if chosen.len() < limit && chosen.iter().all(|c| c.solver != record.solver) {
@@ -64,8 +64,8 @@ pub fn telling(records: &[Record]) -> Vec<&Record> {
     best.2
 }
 
-/// Runs the most telling scene again and records it; the bytes of files. A run that blows up is
-/// recorded up to there.
+/// Runs the most telling scene again and records it. Returns the bytes of the files. A run that diverges is
+/// recorded up to that point.
 pub fn recordings(plan: &StudyPlan, records: &[Record]) -> Result<Vec<Vec<u8>>, Error> {
     telling(records).into_iter().map(|record| recording(plan, record)).collect()
 }

@@ -1,4 +1,4 @@
-//! Twelve kinds of scenes that are hard in as many ways, each drawn from a seed.
+//! Twelve families of scenes, each hard in its own way and drawn from a seed.
 
 use super::shapes::{body, capsule, chain, driven, log_range, of_density, of_surface, once_in};
 use super::{Room, TortureCase};
@@ -8,26 +8,26 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
 
-/// A kind of scenes.
+/// A family of scenes.
 #[derive(Debug)]
 pub struct Family {
-    /// On the command line and in tables.
+    /// Name on the command line and in tables.
     pub name: &'static str,
-    /// The difficulty, in words.
+    /// Description of the difficulty.
     pub summary: &'static str,
     draw: fn(&mut Pcg64Mcg) -> Draft,
 }
 
-/// Draws a scene of the family.
+/// A scene as drawn, before the walls are added.
 struct Draft {
     room: Room,
-    /// Besides the walls.
+    /// All bodies except the walls.
     bodies: Vec<SceneBody>,
-    /// Between these bodies.
+    /// Joints; their indices refer to `bodies`.
     joints: Vec<SceneJoint>,
     gravity: f64,
     dt: f64,
-    /// Simulated (s).
+    /// Simulated time (s).
     seconds: f64,
     rests: bool,
     substeps: Option<u32>,
@@ -58,10 +58,10 @@ pub const FAMILIES: &[Family] = &[
 ];
 
 impl Family {
-    /// Scene `number` of a campaign with this seed. The same for ever: what was drawn before does not matter.
+    /// Scene `number` of a campaign with this seed. It does not depend on scenes drawn before.
     pub fn case(&self, seed: u64, number: u32) -> TortureCase {
         let place = FAMILIES.iter().position(|f| f.name == self.name).unwrap_or(0) as u64;
-        // Neighbors in any of the three begin far apart: odd factors of a Weyl sequence.
+        // Neighboring values of any of the three give distant seeds: odd factors of a Weyl sequence.
         let mixed = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15)
             ^ (place << 32 | u64::from(number)).wrapping_mul(0xd1b5_4a32_d192_ed03);
         let Draft { room, bodies, mut joints, gravity, dt, seconds, rests, substeps } =
@@ -79,19 +79,19 @@ impl Family {
 }
 
 impl Draft {
-    /// Ordinary gravity and steps, for so many seconds.
+    /// A draft with ordinary gravity and steps that lasts `seconds`.
     fn new(room: Room, bodies: Vec<SceneBody>, seconds: f64) -> Self {
         let (joints, dt) = (vec![], 1.0 / 60.0);
         Draft { room, bodies, joints, gravity: 10.0, dt, seconds, rests: false, substeps: None }
     }
 
-    /// Should be at rest at the end.
+    /// The same draft, which must be at rest at the end.
     fn resting(self) -> Self {
         Draft { rests: true, ..self }
     }
 }
 
-/// Bodies of up to `size` in a room about `x` that holds them.
+/// Falling bodies in a closed room about `x`.
 fn falling(random: &mut Pcg64Mcg, x: f64, rolls: bool) -> Draft {
     let count = random.random_range(3..30);
     let size = random.random_range(0.2..0.6);
@@ -175,7 +175,7 @@ fn driven_bodies(random: &mut Pcg64Mcg) -> Draft {
             let piston = driven([-half_width, 0.5 * height], half, [speed, 0.0], 0.0);
             (piston, [1.2, 0.0], way / speed)
         }
-        // A door that leaves room above.
+        // A door with free space above it.
         1 => {
             let half = [1.0, random.random_range(0.2..0.45) * height];
             let door = driven([-half_width, half[1] + 0.05], half, [speed, 0.0], 0.0);
@@ -190,7 +190,7 @@ fn driven_bodies(random: &mut Pcg64Mcg) -> Draft {
         }
     };
     let all = room.places(random, count, size, inset);
-    // None starts in what stirs.
+    // No body starts inside the stirrer.
     let reach = [moving.position[1], if moving.angular_velocity == 0.0 { 0.0 } else { 0.25 + size }];
     let places: Vec<_> = all.into_iter().filter(|p| (p[1] - reach[0]).abs() >= reach[1]).collect();
     let mut bodies = vec![moving];
@@ -222,7 +222,7 @@ fn extremes(random: &mut Pcg64Mcg) -> Draft {
     let dt = log_range(random, 1.0 / 600.0, 1.0 / 15.0);
     let gravity = log_range(random, 0.1, 100.0);
     let substeps = once_in(random, 2).then(|| random.random_range(2..21));
-    // Three times what it takes to fall through the room, and a few hundred steps.
+    // Three times the fall through the room, but at most 500 steps.
     let fall = (2.0 * draft.room.high[1] / gravity).sqrt();
     Draft { dt, gravity, substeps, seconds: (3.0 * fall).min(500.0 * dt), ..draft }
 }

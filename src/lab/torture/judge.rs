@@ -1,4 +1,4 @@
-//! Looks at a run from outside, at its poses alone.
+//! Judges a run from outside, by its poses alone.
 
 use super::{CaseOutcome, Engine, Fault, Room, TortureCase, TortureVerdict};
 use crate::engine::bodies::BodyKind;
@@ -10,64 +10,68 @@ use crate::lab::metrics::overlaps::Overlaps;
 use crate::lab::metrics::state::BodyState;
 use glam::DVec2;
 
-/// Energy, in what was lent, from which on some came from nowhere. The bound is generous where nothing is driven, see
-/// [`Ledger`], and what discretization adds to a fall in long steps is less than a third.
+/// Fraction of the energy budget above which a run counts as having gained energy. The budget is generous
+/// where nothing is driven, see [`Ledger`]; discretization adds less than a third to a fall in long steps.
 pub const ENERGY: f64 = 1.5;
 
-/// Speed, in the fastest that free fall, start and kinematic bodies give, from which on a body was flung. A lever or a
-/// heavy body that hits a light one at most doubles a speed, twice in a row.
+/// A body is flung if its speed exceeds this multiple of the fastest speed that free fall, initial motion and
+/// kinematic bodies explain. A lever, or a heavy body that hits a light one, at most doubles a speed; this
+/// allows for two in a row.
 pub const FLUNG: f64 = 4.0;
 
-/// Overlap, in half the width of the thinner shape, from which on it is sunk.
+/// Overlap above which a body is sunk, as a fraction of half the width of the thinner shape.
 pub const SUNK: f64 = 0.5;
 
-/// Gap of a joint, in the mean reach of the bodies, from which on its ends are apart.
+/// Gap above which the ends of a joint are apart, as a fraction of the mean reach of the bodies.
 pub const APART: f64 = 0.1;
 
-/// Speed at rest, in √(g ℓ) with ℓ the mean reach of the bodies: 9 mm/s for bodies of 0.3 m.
+/// Speed above which a scene is restless, as a fraction of √(g ℓ) with ℓ the mean reach of the bodies: 9 mm/s
+/// for bodies of 0.3 m.
 pub const RESTLESS: f64 = 0.005;
 
-/// Path lengths are summed over every so many steps: what rounds at 10 km is no path.
+/// Path lengths are sums of distances over this many steps, so that rounding at 10 km does not count as
+/// motion.
 const STRIDE: u32 = 6;
 
-/// Energy that the bodies of a scene may have.
+/// Energy budget of a scene.
 ///
-/// With heights over the floor and V the fastest point of a kinematic body,
+/// With heights above the floor and V the speed of the fastest point of a kinematic body,
 ///
 /// ```text
 /// lent = Σ ½ m v₀² + ½ I ω₀² + m g y₀  +  [driven] Σ ½ m (2V)² + m g H  +  [overlapping at the start] Σ m g H
 /// ```
 ///
-/// A body that a kinematic one hits without loss leaves at 2V. A body pushed by it or by an overlap can be lifted to the ceiling,
-/// H over the floor.
+/// A body that a kinematic one hits without loss leaves at 2V. A body pushed by a kinematic one or by an
+/// overlap can be lifted to the ceiling, H above the floor.
 ///
-/// Energy is read from poses. A body's velocity is its way over a step; of two steps in a row the slower counts, so that
-/// a pose that is corrected without a velocity is no motion.
+/// Energy is computed from poses. A body's velocity is its displacement in a step ÷ the step. Of two
+/// consecutive steps the slower one counts, so that a position correction without velocity is not motion.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Ledger {
-    /// J
+    /// The energy budget (J).
     pub lent: f64,
-    /// The fastest that anything should be (m/s).
+    /// Fastest explainable speed (m/s).
     pub speed: f64,
 }
 
-/// Watches one run.
+/// Judges one run.
 pub struct Judge<'c> {
     case: &'c TortureCase,
-    /// Of the case's scene; never stepped, holds masses and shapes, and poses when overlaps are looked for.
+    /// World of the case's scene. It is never stepped: it holds masses, shapes, and poses for the overlap
+    /// search.
     mirror: World,
     bodies: Vec<BodyState>,
     ledger: Ledger,
     reach: f64,
     step: u32,
-    /// Speeds (m/s) and energies of motion (J) over the step before.
+    /// Speed (m/s) and kinetic energy (J) of each body over the previous step.
     before: Vec<[f64; 2]>,
     paths: Vec<(DVec2, f64)>,
     outcome: CaseOutcome,
 }
 
 impl<'c> Judge<'c> {
-    /// Before the first step. Errors: a scene that is not valid.
+    /// A judge before the first step. Errors: an invalid scene.
     pub fn new(case: &'c TortureCase) -> Result<Self, Error> {
         let mirror = case.scene.build(Settings::new(find(DEFAULT)?))?;
         let gravity = DVec2::from(case.scene.gravity);
@@ -93,7 +97,7 @@ impl<'c> Judge<'c> {
         })
     }
 
-    /// Looks at one more step; whether the run is worth going on with.
+    /// Observes one more step; returns whether the run should continue.
     pub fn observe(&mut self, engine: &dyn Engine, is_well: bool) -> bool {
         self.step += 1;
         if !is_well {
@@ -137,7 +141,7 @@ impl<'c> Judge<'c> {
                 *place = position;
             }
         }
-        // Nothing can be lent to a scene without gravity, motion and drive.
+        // A scene without gravity, motion and drive has no energy budget.
         if self.ledger.lent > 0.0 {
             self.outcome.energy = self.outcome.energy.max(total / self.ledger.lent);
         }
@@ -147,7 +151,7 @@ impl<'c> Judge<'c> {
         true
     }
 
-    /// The findings.
+    /// The outcome of the run.
     pub fn finish(mut self) -> CaseOutcome {
         if self.outcome.has(TortureVerdict::Diverged) {
             return self.outcome;
@@ -158,7 +162,7 @@ impl<'c> Judge<'c> {
         if self.case.rests && self.outcome.rest_speed > RESTLESS * (gravity * self.reach).sqrt() {
             self.fault(TortureVerdict::Restless, None);
         }
-        // What a piston presses has nowhere to go.
+        // Bodies pressed by a piston have nowhere to go.
         let is_driven = self.bodies.iter().any(|b| b.kind == BodyKind::Kinematic);
         self.reflect();
         let (depth, body) = self.deepest();
@@ -173,7 +177,7 @@ impl<'c> Judge<'c> {
         self.outcome
     }
 
-    /// Puts the bodies of the mirror where those of the engine are.
+    /// Copies the poses of the engine's bodies to the mirror.
     fn reflect(&mut self) {
         let bodies = &mut self.mirror.bodies;
         for (i, body) in self.bodies.iter().enumerate() {
@@ -185,7 +189,8 @@ impl<'c> Judge<'c> {
         }
     }
 
-    /// The deepest overlap of the mirror, in half the width of the thinner shape, and the second body of it.
+    /// The deepest overlap in the mirror, as a fraction of half the width of the thinner shape, and its
+    /// second body.
     fn deepest(&self) -> (f64, usize) {
         let (mut deepest, world) = ((0.0, 0), &self.mirror);
         Overlaps::default().find(world, |pair, manifold| {
@@ -200,7 +205,7 @@ impl<'c> Judge<'c> {
         deepest
     }
 
-    /// The second body of a joint of the mirror whose ends are apart.
+    /// The second body of a joint whose ends are apart in the mirror, if there is one.
     fn apart(&self) -> Option<usize> {
         let is_apart = |state: JointState| state.gap > APART * self.reach;
         let joint =
@@ -215,7 +220,7 @@ impl<'c> Judge<'c> {
     }
 }
 
-/// m g y over the floor (J); the floor is the corner of the room that is lowest along gravity.
+/// m g y above the floor (J); the floor is at the corner of the room that is lowest along gravity.
 fn height_energy(room: &Room, body: &BodyState, position: DVec2) -> f64 {
     let corner = |k: usize| if body.force[k] < 0.0 { room.low[k] } else { room.high[k] };
     -body.force.dot(position - DVec2::new(corner(0), corner(1)))
@@ -234,7 +239,7 @@ fn reaches(world: &World) -> Vec<f64> {
     reaches
 }
 
-/// See [`Ledger`].
+/// The energy budget of a case, see [`Ledger`].
 fn ledger(case: &TortureCase, mirror: &World, bodies: &[BodyState], reaches: &[f64]) -> Ledger {
     let room = &case.room;
     let height = room.high[1] - room.low[1];
@@ -265,7 +270,7 @@ mod tests {
     use crate::lab::scenes::{Scene, SceneBody, SceneShape};
     use crate::lab::torture::run;
 
-    /// Body 4 goes where it is told.
+    /// An engine that moves body 4 along a given path.
     struct Led<F: Fn(u32) -> [f64; 2]>(u32, F);
 
     impl<F: Fn(u32) -> [f64; 2]> Engine for Led<F> {
@@ -309,7 +314,7 @@ mod tests {
 
     #[test]
     fn energy_comes_from_two_steps_of_motion_and_not_from_one_jump() {
-        // m g y = 0.5 × 10 × m: lent are 5 J/kg, and 7.5 are too much.
+        // m g y = 0.5 × 10 × m: the budget is 5 J/kg, and 7.5 are too much.
         let jump = |k: u32| [if k < 60 { 0.0 } else { 1.0 }, 0.5];
         let found = judged(jump);
         assert!(found.faults.is_empty() && (found.energy - 1.0).abs() < 1e-6, "{found:?}");

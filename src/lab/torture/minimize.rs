@@ -5,14 +5,14 @@ use crate::engine::bodies::BodyKind;
 use crate::lab::error::Error;
 use crate::lab::scenes::Scene;
 
-/// Runs that a minimization may take.
+/// Maximum number of runs of a minimization.
 const MOST_RUNS: u32 = 150;
 
-/// Steps that stay after the one at which a fault was seen.
+/// Number of steps kept after the one with the fault.
 const AFTER: u32 = 10;
 
-/// Leaves bodies out, halves of them first and single ones last, and steps after the fault, as long as `verdict` stands
-/// (delta debugging). `run` judges a case. Errors: those of `run`.
+/// Removes bodies, halves of them first and single ones last, and the steps after the fault, as long as the
+/// case still fails with `verdict` (delta debugging). `run` judges a case. Errors: those of `run`.
 ///
 /// Source: Zeller, Hildebrandt 2002 (delta debugging).
 pub fn minimize(
@@ -30,7 +30,7 @@ pub fn minimize(
         Ok(outcome.faults.iter().find(|f| f.verdict == verdict).map(|f| f.step))
     };
     let mut best = case.clone();
-    // What is judged at the end needs its time.
+    // Faults that are judged at the end need the full length.
     let shortens = !matches!(verdict, TortureVerdict::Sunk | TortureVerdict::Restless);
     if let Some(step) = fails(&best)?.filter(|_| shortens) {
         best.scene.steps = best.scene.steps.min(step + AFTER);
@@ -58,7 +58,7 @@ pub fn minimize(
     Ok(best)
 }
 
-/// Leaves out bodies of these numbers, in order, and their joints.
+/// Removes the bodies with these indices (ascending), and their joints.
 fn leave_out(scene: &mut Scene, gone: &[usize]) {
     let mut number = 0..;
     scene.bodies.retain(|_| number.next().is_some_and(|i: usize| !gone.contains(&i)));
@@ -69,7 +69,7 @@ fn leave_out(scene: &mut Scene, gone: &[usize]) {
     }
 }
 
-/// Bodies that may be left out: walls are the room.
+/// Bodies that may be removed: all but the static ones, which form the room.
 fn removable(case: &TortureCase) -> Vec<usize> {
     let bodies = case.scene.bodies.iter().enumerate();
     bodies.filter(|(_, b)| b.kind != BodyKind::Static).map(|(i, _)| i).collect()
@@ -87,7 +87,7 @@ mod tests {
         let (bodies, joints) = chain([0.0; 2], [0.5, 0.1], 6, &JointKind::Weld(Weld::default()));
         let mut scene = Scene::new("x", bodies).joined(joints);
         leave_out(&mut scene, &[2, 4]);
-        // Links 5 and 6 of before.
+        // Links 5 and 6 of the original.
         let ends: Vec<_> = scene.joints.iter().map(|joint| [joint.a, joint.b]).collect();
         assert_eq!((scene.bodies.len(), ends), (5, vec![[0, 1], [3, 4]]));
         scene.validate().unwrap();

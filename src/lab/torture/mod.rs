@@ -8,14 +8,14 @@
 //! |---|---|
 //! | diverged | a speed or a position out of bounds |
 //! | energy | more energy than gravity, kinematic bodies and the initial state provide, see [`judge::Ledger`] |
-//! | flung | a body much faster than anything in the scene can explain |
-//! | escaped | a body beyond the middle of the walls that close the scene |
-//! | sunk | at the end, two bodies past the middle of the thinner one |
-//! | apart | at the end, a joint whose ends are apart by a tenth of a body |
-//! | restless | still in motion after seconds without a drive |
+//! | flung | a body much faster than the scene can explain |
+//! | escaped | a body past the middle of a wall around the scene |
+//! | sunk | at the end, two bodies overlap by more than half the half-width of the thinner one |
+//! | apart | at the end, a joint with a gap of more than a tenth of a body's reach |
+//! | restless | still in motion in the last second, although nothing drives the scene |
 //!
-//! A step that takes longer than the time that it simulates, without waiting for a processor, counts as late. That depends on the machine, so it is
-//! reported but is not a failure.
+//! A step is late if it takes longer than the time that it simulates, not counting waits for a processor.
+//! That depends on the machine, so it is reported but is not a failure.
 
 pub mod families;
 #[doc(hidden)]
@@ -48,7 +48,7 @@ pub struct TortureCase {
     pub room: Room,
     /// Whether it should be at rest in its last second.
     pub rests: bool,
-    /// Substeps instead of the solver's own, for solvers that take several.
+    /// Number of substeps, instead of the solver's own, for solvers that take several.
     pub substeps: Option<u32>,
 }
 
@@ -65,9 +65,9 @@ pub struct Room {
 
 /// An engine that moves the bodies of a scene.
 pub trait Engine {
-    /// Advances by the scene's step. Errors: what is wrong, where the engine itself says that it diverged.
+    /// Advances by the scene's step. Errors: the reason, if the engine itself detects that it diverged.
     fn step(&mut self) -> Result<(), String>;
-    /// Center of mass (m) and (cos θ, sin θ) of a body by its number in the scene.
+    /// Center of mass (m) and (cos θ, sin θ) of a body, by its index in the scene.
     fn pose(&self, body: usize) -> [[f64; 2]; 2];
 }
 
@@ -75,15 +75,15 @@ pub trait Engine {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TortureVerdict {
-    /// A speed or a place out of all bounds.
+    /// A speed or a position out of bounds.
     Diverged,
-    /// More energy than was lent.
+    /// More energy than the budget, see [`judge::Ledger`].
     Energy,
-    /// One body is much faster than anything could make it.
+    /// A body is much faster than the scene can explain.
     Flung,
     /// A body left the room.
     Escaped,
-    /// Two bodies are past the middle of the thinner one at the end.
+    /// Two bodies overlap by more than half the half-width of the thinner one at the end.
     Sunk,
     /// The ends of a joint are apart at the end.
     Apart,
@@ -103,7 +103,7 @@ impl TortureVerdict {
         TortureVerdict::Restless,
     ];
 
-    /// For tables.
+    /// Word for tables.
     pub fn word(self) -> &'static str {
         match self {
             TortureVerdict::Diverged => "diverged",
@@ -117,44 +117,44 @@ impl TortureVerdict {
     }
 }
 
-/// A verdict with where and how much.
+/// A failure, with its step and body.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Fault {
-    /// The result.
+    /// Kind of failure.
     pub verdict: TortureVerdict,
-    /// First step at which it was seen, from 1.
+    /// First step at which it occurred, from 1.
     pub step: u32,
-    /// The body, where it is about one.
+    /// The body, if it concerns one.
     pub body: Option<usize>,
 }
 
 /// Result of a scene under a solver.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CaseOutcome {
-    /// The first of each verdict, in their order.
+    /// The first fault of each verdict, in the order of verdicts.
     pub faults: Vec<Fault>,
-    /// Most energy ever, in what was lent (1).
+    /// Largest energy, as a fraction of the energy budget (1).
     pub energy: f64,
-    /// Deepest overlap at the end, in half the width of the thinner shape (1).
+    /// Deepest overlap at the end, as a fraction of half the width of the thinner shape (1).
     pub depth: f64,
-    /// How fast the fastest body moves in the last second, along its path (m/s).
+    /// Speed of the fastest body along its path in the last second (m/s).
     pub rest_speed: f64,
-    /// Longest step (ms). Of the machine, not of the solver's result.
+    /// Longest step (ms). It depends on the machine.
     pub slowest_ms: f64,
-    /// Steps that took longer than the time that they simulate.
+    /// Number of steps that took longer than the time that they simulate.
     pub late: u32,
-    /// How evenly its steps are paced, where that is measured.
+    /// How evenly its steps are paced, if measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pace: Option<Pace>,
 }
 
 impl CaseOutcome {
-    /// Whether anything forbidden happened.
+    /// Whether the case has any fault.
     pub fn fails(&self) -> bool {
         !self.faults.is_empty()
     }
 
-    /// Whether this did.
+    /// Whether the case has a fault of this verdict.
     pub fn has(&self, verdict: TortureVerdict) -> bool {
         self.faults.iter().any(|f| f.verdict == verdict)
     }
@@ -163,11 +163,11 @@ impl CaseOutcome {
 /// One scene under one solver.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TortureRow {
-    /// Of the campaign.
+    /// Seed of the campaign.
     pub seed: u64,
     /// [`Family::name`].
     pub family: String,
-    /// Which of its scenes.
+    /// Number of the scene in its family.
     pub number: u32,
     /// The solver, with options that differ from its defaults.
     pub solver: String,
@@ -175,14 +175,14 @@ pub struct TortureRow {
     pub outcome: CaseOutcome,
 }
 
-/// Which scenes of a campaign.
+/// The scenes of a campaign.
 #[derive(Clone, Debug)]
 pub struct Campaign {
-    /// Everything is drawn from it.
+    /// Seed from which all scenes are drawn.
     pub seed: u64,
-    /// By their order in [`FAMILIES`].
+    /// Families, in the order of [`FAMILIES`].
     pub families: Vec<&'static Family>,
-    /// Over all families.
+    /// Number of scenes over all families.
     pub scenes: u32,
 }
 
@@ -195,7 +195,7 @@ impl Campaign {
     }
 }
 
-/// The family of this name. Errors: there is none.
+/// The family called `name`. Errors: an unknown name.
 pub fn family(name: &str) -> Result<&'static Family, Error> {
     FAMILIES
         .iter()
@@ -203,7 +203,7 @@ pub fn family(name: &str) -> Result<&'static Family, Error> {
         .ok_or_else(|| Error::unknown("family", name, FAMILIES.iter().map(|f| f.name)))
 }
 
-/// Runs a case from start to end, or to where it diverges. Errors: a scene that is not valid.
+/// Runs a case to its end, or until it diverges. Errors: an invalid scene.
 pub fn run(case: &TortureCase, engine: &mut dyn Engine) -> Result<CaseOutcome, Error> {
     let mut judge = Judge::new(case)?;
     let (budget, mut slowest, mut late) = (1e3 * case.scene.dt, 0.0_f64, 0);
@@ -219,21 +219,21 @@ pub fn run(case: &TortureCase, engine: &mut dyn Engine) -> Result<CaseOutcome, E
     Ok(CaseOutcome { slowest_ms: slowest, late, ..judge.finish() })
 }
 
-/// Runs a case under one of this crate's solvers. Errors: a scene that is not valid.
+/// Runs a case under one of this crate's solvers. Errors: an invalid scene.
 pub fn run_solver(case: &TortureCase, settings: &Settings) -> Result<CaseOutcome, Error> {
     let mut settings = settings.clone();
     settings.budget.substeps = substeps(case, settings.solver, settings.budget.substeps);
     run(case, &mut Own(case.scene.build(settings)?))
 }
 
-/// How evenly a case is paced under one of this crate's solvers. Errors: a scene that is not valid.
+/// Measures how evenly a case is paced under one of this crate's solvers. Errors: an invalid scene.
 pub fn pace(case: &TortureCase, settings: &Settings, repeats: u32) -> Result<Pace, Error> {
     let mut settings = settings.clone();
     settings.budget.substeps = substeps(case, settings.solver, settings.budget.substeps);
     Pace::measure(|| case.scene.build(settings.clone()), case.scene.steps, repeats)
 }
 
-/// Substeps that a solver takes in a case; one that takes a single one by design keeps it.
+/// Number of substeps that a solver takes in a case; a solver that takes a single one by design keeps it.
 pub fn substeps(case: &TortureCase, solver: &Variant, own: u32) -> u32 {
     case.substeps.filter(|_| solver.budget.substeps > 1).unwrap_or(own)
 }

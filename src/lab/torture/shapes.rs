@@ -1,4 +1,4 @@
-//! Bodies drawn at random, and the room that they are in.
+//! Random bodies, and the room around them.
 
 use super::Room;
 use crate::engine::bodies::BodyKind;
@@ -8,18 +8,18 @@ use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
 
-/// Between `low` and `high`, every order of magnitude alike.
+/// A random number between `low` and `high`, uniform in its logarithm.
 pub fn log_range(random: &mut Pcg64Mcg, low: f64, high: f64) -> f64 {
     random.random_range(low.ln()..high.ln()).exp()
 }
 
-/// True once in `n`.
+/// True with probability 1/`n`.
 pub fn once_in(random: &mut Pcg64Mcg, n: u32) -> bool {
     random.random_range(0..n) == 0
 }
 
-/// A disc, box, capsule or polygon within `size` (m) of its middle, or two boxes as a T. Without discs where `rolls` is
-/// false: on a floor they roll for ever.
+/// A disc, box, capsule or polygon within `size` (m) of its center, or two boxes that form a T. Without discs
+/// if `rolls` is false: on a floor they would roll forever.
 pub fn body(random: &mut Pcg64Mcg, position: [f64; 2], size: f64, rolls: bool) -> SceneBody {
     let part = |random: &mut Pcg64Mcg, low: f64| size * random.random_range(low..0.7);
     let mut second = None;
@@ -44,7 +44,7 @@ pub fn capsule(half: f64, radius: f64) -> SceneShape {
     SceneShape::new(Geometry::Capsule(Capsule { a: [-half, 0.0], b: [half, 0.0], radius }))
 }
 
-/// Three to eight points on a circle, one in each equal part of it.
+/// Three to eight points on a circle, one in each equal sector.
 fn polygon(random: &mut Pcg64Mcg, size: f64) -> SceneShape {
     let count = random.random_range(3..=8);
     let mut angle = |i: u32| TAU * (f64::from(i) + random.random_range(0.2..0.8)) / f64::from(count);
@@ -53,7 +53,7 @@ fn polygon(random: &mut Pcg64Mcg, size: f64) -> SceneShape {
 }
 
 impl Room {
-    /// With its floor's middle at (`x`, 0).
+    /// A room with the middle of its floor at (`x`, 0).
     pub fn new(x: f64, half_width: f64, height: f64, wall: f64) -> Self {
         Room { low: [x - half_width, 0.0], high: [x + half_width, height], wall }
     }
@@ -74,8 +74,8 @@ impl Room {
         ]
     }
 
-    /// Places for `count` bodies that reach `size` at most, apart from each other: rows from the floor up, `inset` from both
-    /// walls; fewer where there is no room for as many.
+    /// Positions for `count` bodies that reach at most `size`, apart from each other: rows from the floor up,
+    /// `inset` from the two walls. Fewer if the room is too small.
     pub fn places(&self, random: &mut Pcg64Mcg, count: u32, size: f64, inset: [f64; 2]) -> Vec<[f64; 2]> {
         let cell = 2.3 * size;
         let (left, right) = (self.low[0] + inset[0], self.high[0] - inset[1]);
@@ -95,7 +95,7 @@ pub fn driven(position: [f64; 2], half: [f64; 2], velocity: [f64; 2], spin: f64)
         .moving(velocity, spin)
 }
 
-/// A static disc, and boxes of half extents `half` that hang from it one after the other, to the right.
+/// A static disc, and a chain of boxes with half extents `half` that extends from it to the right.
 pub fn chain(
     [x, y]: [f64; 2],
     half: [f64; 2],
@@ -119,7 +119,7 @@ pub fn of_density(mut body: SceneBody, density: f64) -> SceneBody {
     body
 }
 
-/// Gives every shape of a body this surface.
+/// Gives every shape of a body this friction and restitution.
 pub fn of_surface(mut body: SceneBody, friction: f64, restitution: f64) -> SceneBody {
     for shape in &mut body.shapes {
         (shape.friction, shape.restitution) = (friction, restitution);

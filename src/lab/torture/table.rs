@@ -1,4 +1,4 @@
-//! Campaigns in numbers: a line per family and solver.
+//! Results of a campaign: one line per family and solver.
 
 use super::families::FAMILIES;
 use super::{TortureRow, TortureVerdict};
@@ -13,43 +13,43 @@ pub struct FamilyLine {
     pub family: String,
     /// The solver.
     pub solver: String,
-    /// How many.
+    /// Number of scenes.
     pub scenes: u32,
-    /// Scenes with a fault.
+    /// Number of scenes with a fault.
     pub failed: u32,
-    /// Scenes with each fault, in the order of [`TortureVerdict::ALL`].
+    /// Number of scenes with each fault, in the order of [`TortureVerdict::ALL`].
     pub faults: [u32; TortureVerdict::ALL.len()],
-    /// Most energy, in what was lent.
+    /// Largest energy, as a fraction of the energy budget.
     pub energy: f64,
-    /// Deepest overlap at an end, in half the width of the thinner shape.
+    /// Deepest overlap at an end, as a fraction of half the width of the thinner shape.
     pub depth: f64,
     /// Longest step (ms).
     pub slowest_ms: f64,
-    /// Steps that took longer than they simulate.
+    /// Number of steps that took longer than the time that they simulate.
     pub late: u32,
-    /// How evenly its scenes are paced, where that is measured.
+    /// How evenly its scenes are paced, if measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pace: Option<FamilyPace>,
 }
 
-/// Steps over the median of steps with as many contacts: of the scenes of a family (1).
+/// Step times ÷ the median of steps with as many contacts, over the scenes of a family (1).
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct FamilyPace {
-    /// First step: median and greatest of all scenes.
+    /// First step: median and maximum over the scenes.
     pub first: [f64; 2],
-    /// Longest other step: median, 99 % and greatest of all scenes.
+    /// Longest other step: median, 99 % and maximum over the scenes.
     pub longest: [f64; 3],
-    /// Scenes whose longest step is longer than [`LONGEST`].
+    /// Number of scenes whose longest step exceeds [`LONGEST`].
     pub too_long: u32,
-    /// Mean step: median and greatest.
+    /// Mean step: median and maximum.
     pub mean: [f64; 2],
 }
 
-/// Longest step over the median of steps with as many contacts that a solver should have (1).
+/// Limit on the longest step ÷ the median of steps with as many contacts (1).
 pub const LONGEST: f64 = 4.0;
 
 impl FamilyPace {
-    /// None without scenes.
+    /// `None` without scenes.
     fn of(paces: &[Pace]) -> Option<Self> {
         let of = |get: fn(&Pace) -> f64| paces.iter().map(get).collect::<Vec<_>>();
         let (first, longest, mean) = (of(|p| p.first), of(|p| p.longest), of(|p| p.mean));
@@ -62,7 +62,7 @@ impl FamilyPace {
     }
 }
 
-/// Every family in order, each under every solver, and all families together.
+/// One line per family and solver, in this order, then all families together.
 pub fn lines(rows: &[TortureRow], solvers: &[String]) -> Vec<FamilyLine> {
     let mut lines = Vec::new();
     for family in FAMILIES.iter().map(|f| f.name).chain(["all"]) {
@@ -117,7 +117,7 @@ pub fn text(lines: &[FamilyLine]) -> String {
     finish(table, 2) + &pace_text(lines)
 }
 
-/// How evenly scenes are paced; empty where that was not measured.
+/// How evenly scenes are paced; empty if it was not measured.
 fn pace_text(lines: &[FamilyLine]) -> String {
     if lines.iter().all(|line| line.pace.is_none()) {
         return String::new();

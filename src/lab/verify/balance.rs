@@ -48,7 +48,7 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// A25. A box half as wide as high, of friction 2, under a weight that leans by θ.
+/// A25. A box of height twice its width, with friction 2, under gravity tilted by θ.
 fn tip(lab: &Lab) -> Result<Finding, Failure> {
     let found = bisect(0.3, 0.7, |tangent| {
         let angle = f64::atan(tangent);
@@ -61,7 +61,7 @@ fn tip(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(found, 0.5, 5e-4))
 }
 
-/// A25. A plank tips once its middle is beyond the edge.
+/// A25. A plank tips once its center is beyond the edge.
 fn overhang(lab: &Lab) -> Result<Finding, Failure> {
     let found = bisect(1.5, 2.5, |over| {
         let table = SceneBody::fixed([-5.0, -0.5], SceneShape::rectangle(5.0, 0.5));
@@ -72,17 +72,17 @@ fn overhang(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(found, 2.0, 1e-3 * 4.0))
 }
 
-/// A25. A ladder of 4 m that leans by φ from the vertical has N = m g below and m g tan φ/2 at the wall, which
-/// friction below has to bear.
+/// A25. A ladder of 4 m leans by φ from the vertical. The ground bears N = m g. The wall bears m g tan φ/2,
+/// which the friction on the ground has to balance.
 fn ladder(lab: &Lab) -> Result<Finding, Failure> {
     let lean = 30f64.to_radians();
     let (sin, cos) = lean.sin_cos();
     let thin = 0.01;
-    // Both left corners touch: the lower one the ground, the upper one the wall.
+    // Both left corners touch: the lower one touches the ground, the upper one the wall.
     let foot = [2.0 * sin - thin * cos, -2.0 * cos - thin * sin];
     let top = [-2.0 * sin - thin * cos, 2.0 * cos - thin * sin];
     let center_at = [-top[0], -foot[1]];
-    // Moments about the foot: wall force times height against weight times reach.
+    // Moments about the foot: wall force × height = weight × horizontal distance of the center.
     let truth = foot[0] / (top[1] - foot[1]);
     let found = bisect(0.5 * truth, 2.0 * truth, |friction| {
         let rod = SceneShape::rectangle(thin, 2.0).friction(friction);
@@ -94,16 +94,17 @@ fn ladder(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(found, truth, 0.01 * truth))
 }
 
-/// A25. Sides that rise by α to the left and β to the right bear m g sin β/sin(α + β) and m g sin α/sin(α + β).
+/// A25. Faces inclined by α on the left and β on the right bear m g sin β/sin(α + β) and m g sin α/sin(α +
+/// β).
 fn groove(lab: &Lab) -> Result<Finding, Failure> {
     let (alpha, beta) = (30f64.to_radians(), 50f64.to_radians());
     let side = |angle: f64| {
-        // A box whose upper face goes through the origin.
+        // A box whose upper face passes through the origin.
         let (sin, cos) = angle.sin_cos();
         SceneBody::fixed([0.5 * sin, -0.5 * cos], SceneShape::rectangle(10.0, 0.5).friction(0.0))
             .turned(angle)
     };
-    // Its center is half a meter from both faces.
+    // The center of the disc is half a meter from both faces.
     let (na, nb) = ([alpha.sin(), alpha.cos()], [-beta.sin(), beta.cos()]);
     let determinant = na[0] * nb[1] - na[1] * nb[0];
     let at = [0.5 * (nb[1] - na[1]) / determinant, 0.5 * (na[0] - nb[0]) / determinant];
@@ -120,8 +121,8 @@ fn groove(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(off, 0.0, load_tolerance(mass(&world), 1.0 / 60.0)).note(note))
 }
 
-/// A25. Five boxes of side H in steps of √(H/g)/20 come to the same rest at any scale: no faster than 1e-4 √(g H), no
-/// deeper than H/100, and no farther off than H/100.
+/// A25. Five boxes of side H, in steps of √(H/g)/20, come to the same rest at any scale. They move at most at
+/// 1e-4 √(g H), sink at most H/100 and drift at most H/100 sideways.
 fn scale(lab: &Lab) -> Result<Finding, Failure> {
     sweep("side (m)", &[1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0], |side| {
         let mut bodies = vec![ground(20.0 * side, 0.6)];

@@ -1,4 +1,4 @@
-//! A28: bodies that are faster than they are wide, with continuous collision.
+//! A28: bodies that move farther than their width in one step, with continuous collision.
 
 use super::Required::Yes;
 use super::lab::*;
@@ -24,10 +24,11 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// Meters per step: 300 m/s at 60 Hz.
+/// Distance traveled in one step (m): 300 m/s at 60 Hz.
 const WAY: f64 = 5.0;
 
-/// Deepest that the far side of what is thrown from the left gets beyond x = 0, where the target's near side is.
+/// Greatest depth (m) of a projectile's far side beyond the target's near side. The projectile comes from the
+/// left; the near side is at x = 0.
 fn thrown(lab: &Lab, target: &SceneBody, bullet: bool) -> Result<f64, Failure> {
     let lab = lab.continuous();
     let shapes =
@@ -39,7 +40,7 @@ fn thrown(lab: &Lab, target: &SceneBody, bullet: bool) -> Result<f64, Failure> {
         let bodies = vec![target.clone(), thrown.moving([60.0 * WAY, 0.0], 0.0)];
         let scene = Scene::new("bullet", bodies).weightless();
         lab.run(scene, 0.5, |world| {
-            // Where the target has gone meanwhile.
+            // Displacement of the target since the start.
             let moved = center(world, 0)[0] - target.position[0];
             deepest = largest([deepest, center(world, 1)[0] + 0.05 - moved]);
         })?;
@@ -47,13 +48,14 @@ fn thrown(lab: &Lab, target: &SceneBody, bullet: bool) -> Result<f64, Failure> {
     Ok(deepest)
 }
 
-/// A28. What stops at a wall has its far side at the wall's near one.
+/// A28. The far side of a stopped projectile must not pass the near side of the wall.
 fn wall(lab: &Lab) -> Result<Finding, Failure> {
     let wall = SceneBody::fixed([0.005, 0.0], SceneShape::rectangle(0.005, 2.0));
     Ok(Finding::new(thrown(lab, &wall, false)?.max(0.0), 0.0, SLOP))
 }
 
-/// A28. A plate of 1 cm × 2 m with a thousand times the mass of the largest thing thrown, 0.01 m² of 1 kg/m²: 500 kg/m².
+/// A28. A plate of 1 cm × 2 m with a thousand times the mass of the largest projectile, 0.01 m² of 1 kg/m²:
+/// 500 kg/m².
 fn plate(lab: &Lab) -> Result<Finding, Failure> {
     let plate = SceneShape::rectangle(0.005, 1.0).density(500.0);
     let plate = SceneBody::dynamic([0.005, 0.0], plate);

@@ -1,4 +1,4 @@
-//! A23 and A24: bodies on supports that move.
+//! A23 and A24: bodies on moving supports.
 
 use super::Required::Yes;
 use super::lab::*;
@@ -87,7 +87,8 @@ fn platform_of(friction: f64) -> SceneBody {
     SceneBody::new(BodyKind::Kinematic, [0.0, -0.5], SceneShape::rectangle(100.0, 0.5).friction(friction))
 }
 
-/// Runs for `seconds`; before each step body 0 is given the velocity that `of` says for the time (m/s).
+/// Runs for `seconds`. Before each step, body 0 is set to the velocity that `of` returns for the end of the
+/// step (m/s).
 fn carry(
     lab: &Lab,
     scene: Scene,
@@ -105,7 +106,7 @@ fn carry(
     Ok(world)
 }
 
-/// A23. m (g + a) on a lift that goes up ever faster.
+/// A23. The load is m (g + a) on a lift that accelerates upward.
 fn lift(lab: &Lab) -> Result<Finding, Failure> {
     let (a, mass) = (0.5 * G, 1.0);
     let body = SceneBody::dynamic([0.0, 0.5], SceneShape::rectangle(0.5, 0.5).density(mass));
@@ -128,7 +129,8 @@ fn lift(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, truth, 0.01 * truth))
 }
 
-/// A23. Beyond µ g by ε a box falls behind by µ g ε t: 1 mm/s after 2 s tell 1e-4.
+/// A23. A box on a platform that accelerates ε µ g above µ g falls behind by µ g ε t. A slip of 1 mm/s after
+/// 2 s resolves ε = 1e-4.
 fn platform(lab: &Lab) -> Result<Finding, Failure> {
     let friction = 0.5;
     let truth = friction * G;
@@ -141,7 +143,7 @@ fn platform(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(found / truth, 1.0, 1e-3))
 }
 
-/// A23. A wall that accelerates at a pushes five boxes: the i-th contact bears (5 − i) m a.
+/// A23. A wall that accelerates at a pushes five boxes: contact i bears (5 − i) m a.
 fn train(lab: &Lab) -> Result<Finding, Failure> {
     let (count, a) = (5, 4.0);
     let wall = SceneShape::rectangle(0.5, 0.5).friction(0.0);
@@ -170,7 +172,7 @@ fn train(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 0.0, 0.01 * f64::from(count) * a))
 }
 
-/// A23. A platform that swings with a greatest acceleration of g/2 does not lose its box.
+/// A23. A platform that oscillates with a peak acceleration of g/2 keeps its box.
 fn shake(lab: &Lab) -> Result<Finding, Failure> {
     let (a, omega) = (0.5 * G, 20.0);
     let body = SceneBody::dynamic([0.0, 0.5], SceneShape::rectangle(0.5, 0.5));
@@ -189,7 +191,7 @@ fn shake(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 0.0, 0.5 * a * dt * dt))
 }
 
-/// A23. A stack does not know how fast it is.
+/// A23. A stack rests on a platform at constant speed as on a fixed one.
 fn carried_stack(lab: &Lab) -> Result<Finding, Failure> {
     let mut bodies = vec![platform_of(0.6).moving([30.0, 0.0], 0.0)];
     for i in 0..5 {
@@ -205,7 +207,7 @@ fn carried_stack(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 0.0, 1e-4))
 }
 
-/// A23. A disc that comes down at 4 m/s and a paddle that goes up at 2 m/s: off at 2 · 2 + 4.
+/// A23. A disc falls at 4 m/s onto a paddle that rises at 2 m/s and leaves at 2 · 2 + 4.
 fn paddle(lab: &Lab) -> Result<Finding, Failure> {
     let surface = SceneShape::rectangle(2.0, 0.5).restitution(1.0).friction(0.0);
     let paddle = SceneBody::new(BodyKind::Kinematic, [0.0, -0.5], surface).moving([0.0, 2.0], 0.0);
@@ -215,7 +217,8 @@ fn paddle(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(velocity(&world, 1)[1], 8.0, 1e-5 * 8.0))
 }
 
-/// A24. On a belt of speed V friction speeds the disc up by µ g and turns it by 2 µ g/r until both add up to V: V/3.
+/// A24. On a belt of speed V, friction accelerates the disc at µ g and spins it up at 2 µ g/r, until the two
+/// add up to V. The final speed is V/3.
 fn belt(lab: &Lab) -> Result<Finding, Failure> {
     let disc = SceneBody::dynamic([0.0, 0.5], SceneShape::disc(0.5).friction(0.5));
     let scene = Scene::new("belt", vec![platform_of(0.5).moving([3.0, 0.0], 0.0), disc]);
@@ -223,14 +226,14 @@ fn belt(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(velocity(&world, 1)[0], 1.0, 0.005))
 }
 
-/// A floor at height 0 of squares of side 1, from −3 m to 20 m.
+/// A floor at height 0 made of squares of side 1, from −3 m to 20 m.
 fn tiled(friction: f64) -> Vec<SceneBody> {
     let tile =
         |i: i32| SceneBody::fixed([f64::from(i), -0.5], SceneShape::rectangle(0.5, 0.5).friction(friction));
     (-3..=20).map(tile).collect()
 }
 
-/// A24. v²/(2 µ g) − v h/2, seams or not.
+/// A24. The stopping distance is v²/(2 µ g) − v h/2, with or without seams.
 fn tiles(lab: &Lab) -> Result<Finding, Failure> {
     let (speed, friction) = (6.0, 0.4);
     let mut bodies = tiled(friction);
@@ -244,7 +247,7 @@ fn tiles(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(center(&world, last)[0] - 0.1, truth, 0.01 * truth).note(note))
 }
 
-/// A24. A disc that rolls at 5 m/s keeps its speed and its height.
+/// A24. A disc rolling at 5 m/s keeps its speed and its height.
 fn seams(lab: &Lab) -> Result<Finding, Failure> {
     let mut bodies = tiled(0.6);
     let last = bodies.len();

@@ -1,4 +1,5 @@
-//! B25: gravity, pushes and steps that change while a pile rests. Nothing moves: what was in equilibrium still is.
+//! B25: gravity, pushes and step lengths that change while a pile rests. Nothing may move, because each
+//! change keeps the equilibrium.
 
 use super::Required::Yes;
 use super::lab::*;
@@ -73,12 +74,13 @@ fn boxes(lab: &Lab) -> Result<Scene, Failure> {
     lab.scene("stack:20")
 }
 
-/// A world of them after 3 s at rest.
+/// A world with these boxes after 3 s at rest.
 fn rested(lab: &Lab) -> Result<World, Failure> {
     lab.run(boxes(lab)?, 3.0, |_| ())
 }
 
-/// Runs `world` for `seconds`: greatest distance of a body from where it was (m), along each axis, and greatest speed (m/s).
+/// Runs `world` for `seconds`. Returns the greatest displacement of a body along x and along y (m), and the
+/// greatest speed (m/s).
 fn watch(world: &mut World, seconds: f64) -> Result<[f64; 3], Failure> {
     let places: Vec<_> = (0..world.bodies.len()).map(|i| center(world, i)).collect();
     let mut most = [0.0; 3];

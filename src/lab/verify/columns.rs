@@ -87,10 +87,10 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// Time in which a column comes to rest (s).
+/// Time for a column to come to rest (s).
 const SETTLE: f64 = 20.0;
 
-/// Runs for [`SETTLE`] and looks at the last `window` seconds.
+/// Runs for [`SETTLE`] and calls `look` in each step of the last `window` seconds.
 pub(super) fn at_rest(
     lab: &Lab,
     scene: Scene,
@@ -104,8 +104,8 @@ pub(super) fn at_rest(
     })
 }
 
-/// B1, B5. Contact i of a column of `count` bodies of 1 kg carries the (count − i) above it: the
-/// worst difference in the last second.
+/// B1, B5. Contact i of a column of `count` bodies of 1 kg carries the (count − i) bodies above it. Measures
+/// the largest deviation in the last second.
 fn loads(lab: &Lab, scene: Scene, count: usize) -> Result<Finding, Failure> {
     let dt = scene.dt;
     let mut worst = 0.0;
@@ -117,7 +117,7 @@ fn load_error(world: &World, count: usize) -> f64 {
     let dt = f64::from(world.settings.dt);
     let mut found = vec![0.0; count];
     for c in &world.contacts {
-        // Body 0 is the ground; a contact of neighbors is named by the lower one.
+        // Body 0 is the ground. A contact between neighbors is indexed by the lower body.
         if let Some(load) = found.get_mut(c.body_a.min(c.body_b) as usize) {
             *load += normal_impulse(c) / dt;
         }
@@ -135,7 +135,7 @@ fn box_loads(lab: &Lab) -> Result<Finding, Failure> {
     loads(lab, lab.scene("stack:10")?, 10)
 }
 
-/// B2. Depths of the contacts of 15 discs against F/(m ω²). At 15 m `f32`s are 2⁻²⁰ m apart, and a
+/// B2. Depths of the contacts of 15 discs compared with F/(m ω²). At 15 m, `f32`s are spaced by 2⁻²⁰ m, and a
 /// depth is a difference of two positions.
 fn soft_depths(lab: &Lab) -> Result<Finding, Failure> {
     let world = at_rest(lab, lab.scene("disc_column:15")?, 0.0, |_| ())?;
@@ -146,34 +146,35 @@ fn soft_depths(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(largest(off), 0.0, 2.0 * 2f64.powi(-20)))
 }
 
-/// B2. A unit box rests with half its weight on each of two corners: 1/m = 1 + 6/4, so 1.25 g/ω².
+/// B2. A unit box rests with half its weight on each of two corners. There 1/m = 1 + 6/4, so the depth is
+/// 1.25 g/ω².
 fn soft_box(lab: &Lab) -> Result<Finding, Failure> {
     let world = at_rest(lab, lab.scene("stack:1")?, 0.0, |_| ())?;
     let deepest = depths(&world).into_iter().map(|(_, depth, _)| depth).fold(f64::NAN, f64::max);
     Ok(Finding::new(deepest, own_depth(lab, world.settings.dt, 0.5 * G, 0.4, true), 2.0 * 2f64.powi(-24)))
 }
 
-/// B2. No overlap of 15 discs is more than what a standard soft contact needs, or the slop: the worst,
-/// in units of that.
+/// B2. No overlap of 15 discs may exceed the slop or the depth of a standard soft contact under its load,
+/// whichever is larger. Measures the largest ratio to that bound.
 fn depth_bound(lab: &Lab) -> Result<Finding, Failure> {
     let world = at_rest(lab, lab.scene("disc_column:15")?, 0.0, |_| ())?;
     Ok(Finding::new(overlap_ratio(&world), 0.0, 1.01))
 }
 
-/// What a stack of boxes did in its last five seconds.
+/// Behavior of a stack of boxes in its last five seconds.
 struct Stack {
-    /// Greatest distance that a box moved (m).
+    /// Greatest displacement of a box (m).
     drift: f64,
     /// Greatest rms speed (m/s).
     speed: f64,
-    /// Farthest that a box is from the axis in the end (m).
+    /// Greatest distance of a box from the axis at the end (m).
     sideways: f64,
-    /// Whether it is a column in the end.
+    /// Whether the boxes still form a column at the end.
     stands: bool,
 }
 
 impl Stack {
-    /// A number of a stack that stands, 0 at best; infinite of one that does not.
+    /// A measured value of a stack, ideally 0; infinite if the stack does not stand.
     fn finding(&self, value: f64, tolerance: f64) -> Finding {
         let measured = if self.stands { value } else { f64::INFINITY };
         Finding::new(measured, 0.0, tolerance)
@@ -195,12 +196,12 @@ fn stack(lab: &Lab, count: u32) -> Result<Stack, Failure> {
     Ok(Stack { drift, speed, sideways, stands: stands(&world, count as usize) })
 }
 
-/// Farthest that a box of a stack that stands may be from the axis (m).
+/// Greatest distance from the axis for the boxes of a standing stack (m).
 const SIDEWAYS: f64 = 1e-3;
 
-/// Whether boxes 1..=count are a column: within [`SIDEWAYS`] of the axis and at their heights, no lower than
-/// soft contacts let them. Each of two points of contact i bears half of what is above, with m = 1/5 (1/2.5
-/// on the ground).
+/// Whether boxes 1..=count form a column: within [`SIDEWAYS`] of the axis and at their heights, no lower than
+/// the depth of soft contacts. Each of the two points of contact i bears half of the weight above it, with m
+/// = 1/5 (1/2.5 on the ground).
 fn stands(world: &World, count: usize) -> bool {
     let mut allowed = 0.0;
     (0..count).all(|i| {
@@ -218,13 +219,13 @@ fn drift(lab: &Lab) -> Result<Finding, Failure> {
     Ok(found.finding(found.drift, 1e-3))
 }
 
-/// B5. Their speed.
+/// B5. Speed of twenty boxes.
 fn jitter(lab: &Lab) -> Result<Finding, Failure> {
     let found = stack(lab, 20)?;
     Ok(found.finding(found.speed, REST))
 }
 
-/// B5. The highest stack that rests after 20 s. The table shows how far a box is from the axis.
+/// B5. The tallest stack that rests after 20 s. The table lists the greatest distance of a box from the axis.
 fn height(lab: &Lab) -> Result<Finding, Failure> {
     sweep("boxes", &[5.0, 10.0, 12.0, 14.0, 16.0, 20.0, 30.0, 40.0, 50.0, 60.0], |count| {
         let found = stack(lab, count as u32)?;
@@ -232,8 +233,8 @@ fn height(lab: &Lab) -> Result<Finding, Failure> {
     })
 }
 
-/// Velocities of five discs after a first step of `factor` times the standard sweeps, with the bodies
-/// in 32 orders: the widest spread of any of them (m/s).
+/// Velocities of five discs after a first step with `factor` times the standard sweeps and the bodies in 32
+/// orders. Returns the widest spread of any velocity (m/s).
 fn order_spread(lab: &Lab, factor: u32) -> Result<f64, Failure> {
     let scene = lab.scene("disc_column:5")?;
     let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(22);
@@ -261,8 +262,8 @@ fn order_spread(lab: &Lab, factor: u32) -> Result<f64, Failure> {
     Ok(largest(range.map(|[low, high]| high - low)))
 }
 
-/// B22. At convergence the order of contacts does not matter: 500 times the standard sweeps, of a rate
-/// of 0.9045 each, leave the rounding of velocities up to g dt = 0.17 m/s, 2⁻²⁷ m/s each, in five
+/// B22. At convergence the order of contacts does not matter. 500 times the standard sweeps, each with a rate
+/// of 0.9045, leave only the rounding of velocities up to g dt = 0.17 m/s, which is 2⁻²⁷ m/s for each of five
 /// bodies.
 fn order_converged(lab: &Lab) -> Result<Finding, Failure> {
     let standard = order_spread(lab, 1)?;

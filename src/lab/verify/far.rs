@@ -23,22 +23,22 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// Greatest error of a difference of 1 m once it is rounded to an `f32`: half of the spacing up to 2 m.
+/// Greatest rounding error of a difference of 1 m stored as an `f32`: half of the spacing below 2 m.
 const ROUNDING: f64 = 1.0 / (1 << 24) as f64;
 
-/// Distance of ten boxes from their twins at the origin, all steps. Positions are kept as sums of
-/// two `f32`s, and contacts see differences of positions, so distance from the origin should not
-/// matter at all: what remains is the rounding of those differences, one per contact.
+/// Distance of ten boxes from their twins at the origin, over all steps. Positions are stored as sums of two
+/// `f32`s, and contacts use differences of positions, so the distance from the origin should not matter at
+/// all. What remains is the rounding of those differences, one per contact.
 fn twins(lab: &Lab, exponent: u32) -> Result<Finding, Failure> {
     lab.catalog(&format!("far_stack:{exponent}"), 10.0 * ROUNDING)
 }
 
-/// B15. At a kilometer, where the spacing of `f32`s is 6.1e-5 m.
+/// B15. At a kilometer, where `f32`s are spaced by 6.1e-5 m.
 fn kilometer(lab: &Lab) -> Result<Finding, Failure> {
     twins(lab, 3)
 }
 
-/// B15. The greatest distance, up to 10⁵ m, at which the trajectory is still the same.
+/// B15. The greatest distance, up to 10⁵ m, with an unchanged trajectory.
 fn distance(lab: &Lab) -> Result<Finding, Failure> {
     sweep("distance (m)", &[1.0, 10.0, 100.0, 1e3, 1e4, 1e5], |distance| {
         let found = twins(lab, distance.log10().round() as u32)?;

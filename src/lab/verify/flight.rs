@@ -1,4 +1,4 @@
-//! A27: impacts of bodies that arrive in flight, and the energy that they may not create.
+//! A27: impacts of bodies in flight, and the energy that impacts must not create.
 
 use super::Required::Yes;
 use super::lab::*;
@@ -50,7 +50,8 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// A27. A disc at 10 m/s meets one at rest with an offset of its radius: n at 30° takes and gives v cos 30° (1 + e)/2.
+/// A27. A disc at 10 m/s hits a resting one with an offset of one radius, so n is at 30°. The impact
+/// transfers v cos 30° (1 + e)/2 along n.
 fn oblique(lab: &Lab) -> Result<Finding, Failure> {
     let (radius, speed) = (0.5, 10.0);
     let (sin, cos): (f64, f64) = (0.5, 0.75f64.sqrt());
@@ -70,13 +71,15 @@ fn oblique(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst / speed, 0.0, 0.01))
 }
 
-/// A27. Flights of √(2 h/g), then of 2 √(2 h/g) eᵏ: together √(2 h/g) (1 + e)/(1 − e).
+/// A27. The first flight lasts √(2 h/g), the following ones 2 √(2 h/g) eᵏ. The sum is √(2 h/g) (1 + e)/(1 −
+/// e).
 fn rest(lab: &Lab) -> Result<Finding, Failure> {
     let (height, e, radius): (f64, f64, f64) = (2.0, 0.5, 0.5);
     let ball = SceneShape::disc(radius).friction(0.0).restitution(e);
     let scene = Scene::new("rest", vec![ground(20.0, 0.0), SceneBody::dynamic([0.0, height + radius], ball)]);
     let (mut last, dt) = (0.0, scene.dt);
-    // In a flight that begins faster than what gravity gives in a step: those have the energy, also where they turn.
+    // A flight counts if it starts faster than g dt. Its energy exceeds this bound throughout, even at its
+    // apex.
     let least = 0.5 * (G * dt).powi(2);
     lab.run(scene, 4.0, |world| {
         if 0.5 * velocity(world, 1)[1].powi(2) + G * (center(world, 1)[1] - radius) > least {
@@ -87,9 +90,10 @@ fn rest(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(last, truth, 2.0 * dt / (1.0 - e)))
 }
 
-/// A27. A body turns about a corner A with ω until its next corner B meets the ground, which is rough: about B its angular momentum
-/// stays, and A is free to leave. With both at d left and right of below the center and the center h above the ground, it is
-/// I ω + m (h² − d²) ω before and (I + m (h² + d²)) ω' after: 11/17 of the spin for a hexagon, 1 − 3/2 sin² α for a box.
+/// A27. A body turns at ω about a corner A until its next corner B hits the rough ground. Its angular
+/// momentum about B is conserved, and A is free to separate. If A and B are at distance d to the left and
+/// right of the center and the center is at height h, the angular momentum is I ω + m (h² − d²) ω before and
+/// (I + m (h² + d²)) ω' after. A hexagon keeps 11/17 of its spin, a box 1 − 3/2 sin² α.
 fn edges(lab: &Lab) -> Result<Finding, Failure> {
     let hexagon: Vec<[f64; 2]> =
         (0..6).map(|k| f64::from(k) * FRAC_PI_3).map(|a| [a.cos(), a.sin()]).collect();
@@ -105,7 +109,8 @@ fn edges(lab: &Lab) -> Result<Finding, Failure> {
     for (shape, d, h, inertia) in shapes {
         let truth = (inertia + h * h - d * d) / (inertia + h * h + d * d);
         let (sin, cos) = lean.sin_cos();
-        // From A, the left corner at the origin, against the clock by `lean`; it turns with the clock.
+        // The left corner A is at the origin. The body is tilted counterclockwise by `lean` and turns
+        // clockwise.
         let at = [d * cos - h * sin, d * sin + h * cos];
         let body = SceneBody::dynamic(at, shape.friction(3.0))
             .turned(lean)
@@ -119,8 +124,8 @@ fn edges(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 0.0, 1e-3).note(note.trim_end_matches("; ")))
 }
 
-/// A27. A dense disc falls on the tip of a light triangle that stands on the tip of one that slides. Friction and contacts without
-/// restitution only take energy; each step adds at most what gravity does.
+/// A27. A dense disc falls on the tip of a light triangle, which stands on the tip of a sliding one. Friction
+/// and contacts without restitution only dissipate energy, so kinetic plus potential energy must not grow.
 fn energy(lab: &Lab) -> Result<Finding, Failure> {
     let triangle = |d: f64, h: f64| SceneShape::polygon(vec![[-d, -h], [d, -h], [0.0, h]]);
     let bodies = vec![
@@ -140,15 +145,17 @@ fn energy(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(most / start - 1.0, 0.0, 1e-3))
 }
 
-/// A27. A rod of 2 m at 45° comes in at 1 m/s and slides to either side. v_n⁺ = e is Newton's, T Coulomb's, or as much of it as leaves the
-/// energy what it was (Kane): K is convex along the line from no friction, which takes energy, to T, so that bisection finds it.
+/// A27. A rod of 2 m at 45° falls at 1 m/s and slides to either side. v_n⁺ = e follows from Newton's law. T
+/// follows from Coulomb's law, or is the largest part of it that does not increase the energy (Kane). The
+/// energy K is convex along the line from no friction, which loses energy, to T, so bisection finds that
+/// part.
 fn rod(lab: &Lab) -> Result<Finding, Failure> {
     let (half, thin, mu) = (1.0f64, 0.02f64, 1.0);
     let inertia = (half * half + thin * thin) / 3.0;
-    // Its lowest corner, about the center.
+    // The rod's lowest corner, relative to its center.
     let diagonal = 0.5f64.sqrt();
     let [x, y] = [diagonal * (thin - half), -diagonal * (half + thin)];
-    // n = (0, 1) and t = (1, 0): of an impulse (N, T) the corner gains k (N, T).
+    // n = (0, 1) and t = (1, 0): an impulse (N, T) changes the corner's velocity by k (N, T).
     let [k_nn, k_tt, k_nt] = [1.0 + x * x / inertia, 1.0 + y * y / inertia, -x * y / inertia];
     let after = |[n, t]: [f64; 2], slip: f64| [slip + t, n - 1.0, (x * n - y * t) / inertia];
     let energy = |[vx, vy, w]: [f64; 3]| 0.5 * (vx * vx + vy * vy + inertia * w * w);

@@ -128,18 +128,18 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// A5. Worst apex of four bounces from 10 m with e = ½. Rebounds keep the discrete energy of flight, so
-/// apexes are off by rounding alone: 1e-5 of the height, as in A0.
+/// A5. Largest apex error of four bounces from 10 m with e = ½. Rebounds keep the discrete energy of flight,
+/// so only rounding changes the apexes: 1e-5 of the height, as in A0.
 fn bounce(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("bounce", 1e-5 * 10.0)
 }
 
-/// A6. Worst apex of twenty elastic bounces from 1 m.
+/// A6. Largest apex error of twenty elastic bounces from 1 m.
 fn elastic(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("bounce_elastic", 0.005)
 }
 
-/// A6. A box has the apexes of a disc, and does not turn.
+/// A6. A box reaches the same apexes as a disc and does not rotate.
 fn flat_bounces(lab: &Lab) -> Result<Finding, Failure> {
     let shape = SceneShape::rectangle(0.5, 0.25).friction(0.0).restitution(1.0);
     let scene = Scene::new("flat", vec![ground(5.0, 0.0), SceneBody::dynamic([0.0, 1.25], shape)]);
@@ -161,7 +161,7 @@ fn flat_bounces(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 0.0, 0.005))
 }
 
-/// A7. The worse of two outgoing speeds, at 2 m/s.
+/// A7. The larger error of two outgoing speeds, at 2 m/s.
 fn oblique(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("oblique_collision", 1e-5 * 2.0)
 }
@@ -170,7 +170,8 @@ fn smooth_disc(radius: f64) -> SceneShape {
     SceneShape::disc(radius).friction(0.0).restitution(1.0)
 }
 
-/// A17. Sixteen smooth elastic discs in a box of 10 m: change of kinetic energy over 10⁴ collisions.
+/// A17. Sixteen frictionless elastic discs in a box of 10 m: change of the kinetic energy over 10⁴
+/// collisions.
 fn billiards(lab: &Lab) -> Result<Finding, Failure> {
     let wall = |x: f64, y: f64| {
         let half = if x == 0.0 { [6.0, 0.5] } else { [0.5, 6.0] };
@@ -185,7 +186,8 @@ fn billiards(lab: &Lab) -> Result<Finding, Failure> {
     let mut world = lab.world(Scene::new("billiards", bodies).weightless())?;
     let start = kinetic_energy(&world);
     let mut hits = 0;
-    // At 5 m/s some 40 collisions a second: far more than enough, and an end for those that slow down.
+    // At 5 m/s there are about 40 collisions a second. The bound is far above the need and ends runs that
+    // slow down.
     for _ in 0..40_000 {
         world.step()?;
         hits += world.contacts.iter().filter(|c| c.step_impulse[0][0] > 0.0).count();
@@ -197,7 +199,8 @@ fn billiards(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(kinetic_energy(&world) / start - 1.0, 0.0, 1e-3).note(note))
 }
 
-/// Final speeds over the incoming one, and the largest E/E0 − 1 on the way, of `n` discs `gap` apart.
+/// Final speeds relative to the incoming one, and the largest E/E0 − 1 during the run, for `n` discs with
+/// gaps of `gap` (m).
 fn cradle(lab: &Lab, n: usize, gap: f64) -> Result<(Vec<f64>, f64), Failure> {
     let speed = 4.0;
     let mut bodies = vec![SceneBody::dynamic([-2.0, 0.0], smooth_disc(0.5)).moving([speed, 0.0], 0.0)];
@@ -214,14 +217,15 @@ fn list(speeds: &[f64]) -> String {
     format!("speeds ({})", speeds.join(", "))
 }
 
-/// A18. Gaps of 10⁻³ r: one impact after the other, so the last of five leaves with all the speed.
+/// A18. With gaps of 10⁻³ r the impacts happen one after the other, so the last of five discs leaves with the
+/// full speed.
 fn cradle_sequence(lab: &Lab) -> Result<Finding, Failure> {
     let (speeds, _) = cradle(lab, 5, 5e-4)?;
     Ok(Finding::new(speeds[4], 1.0, 0.01).note(list(&speeds)))
 }
 
-/// A18. Three that touch: two laws conserve momentum and energy, the sequential (0, 0, 1) and the
-/// simultaneous (−1/3, 2/3, 2/3). The distance to the nearer.
+/// A18. Three touching discs. Two laws conserve momentum and energy: the sequential one gives (0, 0, 1), the
+/// simultaneous one (−1/3, 2/3, 2/3). Measures the distance to the nearer law.
 fn cradle_law(lab: &Lab) -> Result<Finding, Failure> {
     let (speeds, _) = cradle(lab, 3, 0.0)?;
     let (distance, law) = nearest_law(&speeds);
@@ -234,7 +238,7 @@ fn nearest_law(speeds: &[f64]) -> (f64, &'static str) {
     if one <= all { (one, "sequential") } else { (all, "simultaneous") }
 }
 
-/// A18. Energy never grows, touching or not, three or five.
+/// A18. Energy never grows, for three or five discs, touching or not.
 fn cradle_energy(lab: &Lab) -> Result<Finding, Failure> {
     let mut gain = 0.0;
     for (n, gap) in [(3, 0.0), (3, 5e-4), (5, 0.0), (5, 5e-4)] {
@@ -243,8 +247,7 @@ fn cradle_energy(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(gain, 0.0, 1e-5))
 }
 
-/// A body of 1 kg that touches the ground with one point, `arm` from its center (m), and comes in at
-/// `velocity` (m/s).
+/// A body of 1 kg that hits the ground with one point, at `arm` from its center (m), with `velocity` (m/s).
 struct Rough {
     shape: SceneShape,
     angle: f64,
@@ -254,11 +257,11 @@ struct Rough {
     spin: f64,
 }
 
-/// Velocity and spin after an impact under Newton's law with `e` and Coulomb's friction with `mu` on the
-/// impulses of all of it, by hand: v_n⁺ = −e v_n, and along t the impulse that stops the point, or ±µ N.
+/// Velocity and spin after an impact, derived by hand: Newton's law with `e` gives v_n⁺ = −e v_n. Coulomb's
+/// law with `mu` holds for the total impulses: the tangential impulse stops the point or is ±µ N.
 fn after_impact(rough: &Rough, e: f64, mu: f64) -> [f64; 3] {
     let ([x, y], [vx, vy], w) = (rough.arm, rough.velocity, rough.spin);
-    // The ground's normal is (0, 1); its tangent is taken as (1, 0).
+    // The ground's normal is (0, 1), its tangent (1, 0).
     let (vn, vt) = (vy + w * x, vx - w * y);
     let (k_nn, k_tt) = (1.0 + x * x / rough.inertia, 1.0 + y * y / rough.inertia);
     let k_nt = -x * y / rough.inertia;
@@ -266,13 +269,13 @@ fn after_impact(rough: &Rough, e: f64, mu: f64) -> [f64; 3] {
     [vx + tangent, vy + normal, w + (x * normal - y * tangent) / rough.inertia]
 }
 
-/// The worst difference from [`after_impact`] over restitutions and frictions that slide and stick (m/s, and
-/// m/s at the arm of the spin).
+/// The largest deviation from [`after_impact`] over restitutions and frictions, sliding and sticking (m/s;
+/// spins are multiplied by the arm).
 fn rough_impact(lab: &Lab, rough: impl Fn() -> Rough) -> Result<Finding, Failure> {
     rough_impacts(lab, &[0.2, 0.5, 0.9], &[0.0], 1e-4, rough)
 }
 
-/// The same from `heights` above the ground (m).
+/// The same, dropped from `heights` above the ground (m).
 fn rough_impacts(
     lab: &Lab,
     restitutions: &[f64],
@@ -310,40 +313,41 @@ fn rough_impacts(
     Ok(Finding::new(worst, 0.0, tolerance).note(of))
 }
 
-/// Heights that 4 m/s make up in parts of a step of 1/60 s, and in more than one (m).
+/// Heights (m) that 4 m/s covers in a fraction of a step of 1/60 s or in several steps.
 const HEIGHTS: &[f64] = &[0.004, 0.015, 0.03, 0.05, 0.1, 0.3];
 
-/// A19. A disc, at 3 m/s along the ground and with a spin that is not that of rolling.
+/// A19. A disc at 3 m/s along the ground, with a spin that does not match rolling.
 fn rough_disc(lab: &Lab) -> Result<Finding, Failure> {
     rough_impact(lab, disc)
 }
 
-/// A19. The same disc from above: whether a step sees it before it arrives or after, its arm is its radius.
+/// A19. The same disc dropped from above. Its arm is its radius, whether a step detects it before or after it
+/// arrives.
 fn fallen_disc(lab: &Lab) -> Result<Finding, Failure> {
     rough_impacts(lab, &[0.2, 0.5, 0.9], HEIGHTS, 1e-4, disc)
 }
 
-/// A19. The same corner from above, without spin until it arrives.
+/// A19. The same corner dropped from above, without spin before the impact.
 fn fallen_corner(lab: &Lab) -> Result<Finding, Failure> {
     rough_impacts(lab, &[0.2, 0.5, 0.9], HEIGHTS, 1e-4, || Rough { spin: 0.0, ..corner() })
 }
 
-/// A19. The law is the same without restitution, v_n⁺ = 0.
+/// A19. The same law without restitution, v_n⁺ = 0.
 fn plastic(lab: &Lab) -> Result<Finding, Failure> {
     let disc = rough_impacts(lab, &[0.0], &[0.0], 1e-4, disc)?;
     let corner = rough_impacts(lab, &[0.0], &[0.0], 1e-4, corner)?;
     Ok(worse(disc, corner))
 }
 
-/// A19. Without restitution from above; the corner without spin until it arrives.
+/// A19. Dropped from above without restitution. The corner has no spin before the impact.
 fn landed(lab: &Lab) -> Result<Finding, Failure> {
     let disc = rough_impacts(lab, &[0.0], HEIGHTS, 1e-4, disc)?;
     let corner = rough_impacts(lab, &[0.0], HEIGHTS, 1e-4, || Rough { spin: 0.0, ..corner() })?;
     Ok(worse(disc, corner))
 }
 
-/// A19. A box of 2 m × ½ m does not turn over: both ends of its face are hit, and the whole impulse is 4 N·s per
-/// kilogram. Friction takes µ of it, or all of 3 m/s.
+/// A19. A box of 2 m × ½ m lands flat and does not rotate: both ends of its face are hit, and the total
+/// impulse is 4 N·s per kilogram. The friction impulse is µ times that, or whatever stops the 3 m/s.
 fn flat_landing(lab: &Lab) -> Result<Finding, Failure> {
     let (mut worst, mut of) = (0.0, String::new());
     for mu in [0.05, 0.2, 0.5, 1.0] {
@@ -422,7 +426,7 @@ mod tests {
     fn each_law_is_at_no_distance_from_itself() {
         assert_eq!(nearest_law(&[0.0, 0.0, 1.0]), (0.0, "sequential"));
         assert_eq!(nearest_law(&[-1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0]), (0.0, "simultaneous"));
-        // All three go on together: plastic, no law of elastic impact.
+        // All three move on together: a plastic impact, not a law of elastic impacts.
         assert!((nearest_law(&[1.0 / 3.0; 3]).0 - 2.0 / 3.0).abs() < 1e-15);
         assert_eq!(nearest_law(&[f64::NAN, 0.0, 1.0]).0, f64::INFINITY);
     }

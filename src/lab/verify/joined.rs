@@ -147,7 +147,8 @@ fn cranks(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("four_bar", 0.01)
 }
 
-/// Three rods of 1 m in a triangle, hinged to each other and, at a corner, to the ground; it turns about there.
+/// Three rods of 1 m form a triangle, hinged to each other and, at one corner, to the ground. The triangle
+/// turns about that corner. Returns its final spin (rad/s) and its largest gap (m).
 fn triangle(lab: &Lab) -> Result<[f64; 2], Failure> {
     let speed = 3.0;
     let corners = [[0.0, 0.0], [1.0, 0.0], [0.5, 0.75_f64.sqrt()]];
@@ -179,8 +180,8 @@ fn triangle_gap(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(triangle(lab)?[1], 0.0, 1e-3))
 }
 
-/// A chain of `links` rods of 1 kg and 1 m that swings from the side, with a square of `ratio` kg at its end; `sign` is the
-/// side.
+/// A chain of `links` rods of 1 kg and 1 m that starts horizontal and swings, with a square of `ratio` kg at
+/// its end. `sign` selects the side.
 fn chain(links: usize, ratio: f64, sign: f64) -> Scene {
     let mut bodies = vec![SceneBody::fixed([0.0, 0.0], SceneShape::disc(0.05))];
     let mut joints = vec![];
@@ -199,7 +200,8 @@ fn chain(links: usize, ratio: f64, sign: f64) -> Scene {
 
 const LINKS: usize = 4;
 
-/// Greatest distance of two runs of 2 s, once `back` takes the places of the second to those of the first.
+/// Greatest distance between two runs of 2 s, after `back` maps positions of the second run to those of the
+/// first.
 fn apart(lab: &Lab, scenes: [Scene; 2], back: impl Fn([f64; 2]) -> [f64; 2]) -> Result<f64, Failure> {
     let mut paths = [vec![], vec![]];
     for (scene, path) in scenes.into_iter().zip(&mut paths) {
@@ -258,11 +260,11 @@ fn drive(lab: &Lab) -> Result<Finding, Failure> {
         joints.push(SceneJoint::new(1, 2 + i, JointKind::Wheel(wheel)));
     }
     let world = lab.run(Scene::new("car", bodies).joined(joints), 8.0, |_| ())?;
-    // The motor turns a wheel against the car, which hardly turns.
+    // The motor's speed is relative to the car, which hardly rotates.
     Ok(Finding::new(velocity(&world, 1)[0] / (10.0 * radius), 1.0, 0.01))
 }
 
-/// A31. Each finger presses with F, and holds µ F of the weight.
+/// A31. Each finger presses with F and carries µ F of the weight.
 fn gripper(lab: &Lab) -> Result<Finding, Failure> {
     let friction = 0.5;
     let found = bisect(0.8, 1.2, |part| {
@@ -300,13 +302,13 @@ fn sag_gap(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(largest(gaps(&world)), 0.0, 1e-3))
 }
 
-/// B16. Rods of 10 N: the joint in the middle bears H alone, 111.9186 N.
+/// B16. Rods of 10 N. The middle joint carries only the horizontal tension H, 111.9186 N.
 fn sag_tension(lab: &Lab) -> Result<Finding, Failure> {
     let world = lab.run(lab.scene("hanging_chain")?, 20.0, |_| ())?;
     Ok(Finding::new(joint_load(&world, 10)[0], 111.9186, 1.119))
 }
 
-/// B17. The ball and chain of the catalog, hung straight.
+/// B17. The ball and chain of the scene catalog, hanging straight down.
 fn tension(lab: &Lab) -> Result<Finding, Failure> {
     let mut scene = lab.scene("ball_and_chain")?;
     for body in &mut scene.bodies[1..] {
@@ -332,7 +334,7 @@ fn ball(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("ball_and_chain", 0.005)
 }
 
-/// B17. From the side, for 5 s.
+/// B17. The chain starts horizontal and swings for 5 s.
 fn ratio(lab: &Lab) -> Result<Finding, Failure> {
     sweep("ratio of masses (1)", &[1.0, 10.0, 100.0, 1000.0], |ratio| {
         let (mut sum, mut count) = (0.0, 0.0);

@@ -1,4 +1,4 @@
-//! Tools of the cases: worlds of one solver, and measurements of their state in `f64`.
+//! Shared tools of the cases: worlds for one solver, and measurements of their state in `f64`.
 
 use super::{Failure, Finding, ParameterSweep, SweepRow};
 use crate::engine::bodies::BodyKind;
@@ -10,16 +10,16 @@ use crate::engine::world::{Settings, World};
 use crate::lab::scenes::{self, Scene, SceneBody, SceneShape};
 use std::f64::consts::TAU;
 
-/// Gravity of every case that has some (m/s²).
+/// Gravity of every case that uses it (m/s²).
 pub(super) const G: f64 = -DEFAULT_GRAVITY[1];
 
-/// Overlap that position correction may leave (m).
+/// Overlap that position correction may leave uncorrected (m).
 pub(super) const SLOP: f64 = LINEAR_SLOP as f64;
 
 /// Speed below which a pile counts as at rest (m/s): the jitter limit of case B5.
 pub(super) const REST: f64 = 1e-4;
 
-/// A solver to be judged, at its standard budget.
+/// A solver under test, with its standard budget.
 pub struct Lab {
     pub(super) settings: Settings,
     change: Option<fn(&mut Scene)>,
@@ -31,31 +31,31 @@ impl Lab {
         Lab { settings: Settings { record_impulses: true, ..Settings::new(solver) }, change: None }
     }
 
-    /// The same laboratory under another treatment of impacts.
+    /// Uses another treatment of impacts.
     pub fn impacts(mut self, impacts: Impacts) -> Self {
         self.settings.impacts = impacts;
         self
     }
 
-    /// The same laboratory with a solver that lacks some of its mechanisms.
+    /// Turns off some mechanisms of the solver.
     pub fn without(mut self, without: Without) -> Self {
         self.settings.without = without;
         self
     }
 
-    /// The same laboratory with continuous collision.
+    /// The same laboratory with continuous collision turned on.
     pub(super) fn continuous(&self) -> Self {
         let settings = Settings { continuous: true, ..self.settings.clone() };
         Lab { settings, change: self.change }
     }
 
-    /// The same laboratory, in which every scene is changed before it is built: to see that
-    /// wrong physics fails. The truths stay those of the unchanged scenes.
+    /// Applies `change` to every scene before it is built, to check that wrong physics fails. The reference
+    /// values remain those of the unchanged scenes.
     pub fn changing(self, change: fn(&mut Scene)) -> Self {
         Lab { change: Some(change), ..self }
     }
 
-    /// A world of `scene`.
+    /// Builds the world of `scene`.
     pub(super) fn world(&self, mut scene: Scene) -> Result<World, Failure> {
         if let Some(change) = self.change {
             change(&mut scene);
@@ -64,7 +64,7 @@ impl Lab {
         Ok(scene.build(self.settings.clone())?)
     }
 
-    /// Runs `scene` for `seconds` and looks at every step.
+    /// Runs `scene` for `seconds` and calls `look` after every step.
     pub(super) fn run(
         &self,
         scene: Scene,
@@ -79,8 +79,8 @@ impl Lab {
         Ok(world)
     }
 
-    /// Runs a scene of the catalog over its own length; the measured value is the error that
-    /// its truth's observer sees.
+    /// Runs a scene of the catalog over its full length. The measured value is the error that the observer of
+    /// its reference value reports.
     pub(super) fn catalog(&self, name: &str, tolerance: f64) -> Result<Finding, Failure> {
         let loaded = scenes::load(name)?;
         let mut truth =
@@ -91,7 +91,7 @@ impl Lab {
         Ok(Finding::new(error, 0.0, tolerance))
     }
 
-    /// A scene of the catalog, to be watched by a case's own eyes.
+    /// A scene of the catalog, for cases with measurements of their own.
     pub(super) fn scene(&self, name: &str) -> Result<Scene, Failure> {
         Ok(scenes::load(name)?.scene)
     }
@@ -102,8 +102,8 @@ impl Lab {
     }
 }
 
-/// Depth (m) at which the solver's own soft contact bears `load` (N) with the effective mass `mass` (kg)
-/// in steps of `dt` (s): the spring's m ω² s = F, with the solver's ω.
+/// Depth (m) at which the solver's own soft contact bears `load` (N) with the effective mass `mass` (kg) in
+/// steps of `dt` (s). It follows from the spring's law m ω² s = F with the solver's ω.
 pub(super) fn own_depth(lab: &Lab, dt: f32, load: f64, mass: f64, on_static: bool) -> f64 {
     let settings = &lab.settings;
     let h = dt / settings.budget.substeps as f32;
@@ -112,20 +112,20 @@ pub(super) fn own_depth(lab: &Lab, dt: f32, load: f64, mass: f64, on_static: boo
     load / (mass * omega * omega)
 }
 
-/// Depth (m) at which a standard soft contact bears `load` (N) with the effective mass `mass` (kg): the
-/// spring's m ω² s = F, with twice the frequency on static bodies. Every solver is held to it, whatever
-/// its contacts are.
+/// Depth (m) at which a standard soft contact bears `load` (N) with the effective mass `mass` (kg). It
+/// follows from the spring's law m ω² s = F, with twice the frequency on static bodies. Every solver is
+/// compared with it, whatever its contacts are.
 pub(super) fn soft_depth(load: f64, mass: f64, on_static: bool) -> f64 {
     let omega = TAU * f64::from(CONTACT_HERTZ) * if on_static { 2.0 } else { 1.0 };
     load / (mass * omega * omega)
 }
 
-/// Whole steps in `seconds`.
+/// Number of whole steps in `seconds`.
 pub(super) fn steps(world: &World, seconds: f64) -> u64 {
     (seconds / f64::from(world.settings.dt)).round() as u64
 }
 
-/// s
+/// Simulated time (s).
 pub(super) fn time(world: &World) -> f64 {
     world.step_index as f64 * f64::from(world.settings.dt)
 }
@@ -135,17 +135,17 @@ pub(super) fn center(world: &World, i: usize) -> [f64; 2] {
     world.bodies.center(i)
 }
 
-/// m/s
+/// Velocity of body `i` (m/s).
 pub(super) fn velocity(world: &World, i: usize) -> [f64; 2] {
     [f64::from(world.bodies.velocity_x[i]), f64::from(world.bodies.velocity_y[i])]
 }
 
-/// rad/s
+/// Angular velocity of body `i` (rad/s).
 pub(super) fn spin(world: &World, i: usize) -> f64 {
     f64::from(world.bodies.angular_velocity[i])
 }
 
-/// Component down a slope that falls to the right by `angle` (rad).
+/// Component along a slope that descends to the right at `angle` (rad), positive downhill.
 pub(super) fn downhill([x, y]: [f64; 2], angle: f64) -> f64 {
     x * angle.cos() - y * angle.sin()
 }
@@ -159,7 +159,7 @@ pub(super) fn dynamic(world: &World) -> impl Iterator<Item = (usize, f64, f64)> 
         .map(move |i| (i, inverse(b.inv_mass[i]), inverse(b.inv_inertia[i])))
 }
 
-/// J
+/// Kinetic energy of all dynamic bodies (J).
 pub(super) fn kinetic_energy(world: &World) -> f64 {
     let of = |(i, m, inertia): (usize, f64, f64)| {
         let ([x, y], w) = (velocity(world, i), spin(world, i));
@@ -173,18 +173,18 @@ pub(super) fn gaps(world: &World) -> impl Iterator<Item = f64> + '_ {
     world.joints().map(|(handle, _)| world.joint_state(handle).map_or(f64::NAN, |state| state.gap))
 }
 
-/// Force (N) and torque (N·m) of the joint that was added as number `i`, in the last substep.
+/// Force (N) and torque (N·m) of joint `i`, in order of addition, in the last substep.
 pub(super) fn joint_load(world: &World, i: usize) -> [f64; 2] {
     let handle = world.joints().nth(i).map(|(handle, _)| handle);
     handle.and_then(|handle| world.joint_state(handle).ok()).map_or([f64::NAN; 2], |state| state.load)
 }
 
-/// kg
+/// Mass of all dynamic bodies (kg).
 pub(super) fn mass(world: &World) -> f64 {
     dynamic(world).map(|(_, m, _)| m).sum()
 }
 
-/// √(2 E/m) (m/s).
+/// Rms speed, √(2 E/m) (m/s).
 pub(super) fn rms_speed(world: &World) -> f64 {
     (2.0 * kinetic_energy(world) / mass(world)).sqrt()
 }
@@ -194,7 +194,8 @@ pub(super) fn normal_impulse(contact: &Contact) -> f64 {
     contact.step_impulse[..contact.manifold.points().len()].iter().map(|p| f64::from(p[0])).sum()
 }
 
-/// Impulse of a contact on its body b over the last step (N·s), along n and t = (n_y, −n_x).
+/// Impulse of a contact on its body b over the last step (N·s), in world axes. The normal part acts along n,
+/// friction along t = (n_y, −n_x).
 pub(super) fn impulse(contact: &Contact) -> [f64; 2] {
     let n = contact.manifold.normal;
     let (nx, ny) = (f64::from(n.x), f64::from(n.y));
@@ -211,14 +212,14 @@ pub(super) fn ground_load(world: &World) -> f64 {
     sum / f64::from(world.settings.dt)
 }
 
-/// How far the load under bodies of `mass` (kg) that rest as well as [`REST`] asks may be from their
-/// weight (N): in a step, no velocity may change by more than 2 · [`REST`].
+/// Tolerance (N) of the load under resting bodies of `mass` (kg): if they rest within [`REST`], no velocity
+/// changes by more than 2 · [`REST`] in a step.
 pub(super) fn load_tolerance(mass: f64, dt: f64) -> f64 {
     2.0 * REST * mass / dt
 }
 
-/// Of every contact point: its two bodies, its depth (m, negative for a gap), and the depth at which a
-/// standard soft contact would bear the load that it bore over the last step (m).
+/// For every contact point: its two bodies, its depth (m, negative for a gap), and the depth at which a
+/// standard soft contact would bear the point's load of the last step (m).
 pub(super) fn depths(world: &World) -> Vec<([u32; 2], f64, f64)> {
     let b = &world.bodies;
     let dt = f64::from(world.settings.dt);
@@ -241,8 +242,8 @@ pub(super) fn depths(world: &World) -> Vec<([u32; 2], f64, f64)> {
     all
 }
 
-/// The worst overlap in units of what is allowed: the slop, or the soft contact's depth under the
-/// load it bears, whichever is more.
+/// The largest overlap relative to the allowed one, which is the slop or the soft contact's depth under its
+/// load, whichever is larger.
 pub(super) fn overlap_ratio(world: &World) -> f64 {
     largest(depths(world).into_iter().map(|(_, depth, soft)| depth.max(0.0) / soft.max(SLOP)))
 }
@@ -252,13 +253,14 @@ pub(super) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, |m, v| if v.is_nan() { f64::INFINITY } else { m.max(v) })
 }
 
-/// The finding that is farther off.
+/// The finding with the larger measured value.
 pub(super) fn worse(a: Finding, b: Finding) -> Finding {
     if a.measured > b.measured { a } else { b }
 }
 
-/// Impulses [T, N] of an impact (N·s) under Newton's law with `e` and Coulomb's with `mu` on all of them: v_n⁺ = −e v_n,
-/// and along t what stops the points, or ±µ N. `k` is (nn, tt, nt) of the inverse masses, `[vt, vn]` how the points meet.
+/// Impulses [T, N] of an impact (N·s). Newton's law with `e` gives v_n⁺ = −e v_n. Coulomb's law with `mu`
+/// holds for the total impulses: T stops the points or is ±µ N. `k` holds (nn, tt, nt) of the inverse masses,
+/// `[vt, vn]` the relative velocity.
 pub(super) fn rough_impulse(k: [f64; 3], [vt, vn]: [f64; 2], e: f64, mu: f64) -> [f64; 2] {
     let [k_nn, k_tt, k_nt] = k;
     let rise = -(1.0 + e) * vn;
@@ -283,8 +285,8 @@ pub(super) fn slope(points: &[(f64, f64)]) -> f64 {
     tx / tt
 }
 
-/// Where in [`low`, `high`] `above` turns from false to true, to 2⁻¹⁸ of the interval; an end of it where
-/// it does not turn.
+/// The point of [`low`, `high`] at which `above` changes from false to true, to 2⁻¹⁸ of the interval. If it
+/// never changes, an end of the interval.
 pub(super) fn bisect(
     mut low: f64,
     mut high: f64,
@@ -303,9 +305,9 @@ pub(super) fn bisect(
     Ok(0.5 * (low + high))
 }
 
-/// Tries a growing parameter; what is measured is the last value before the first that fails (0 if the
-/// first does), what is wanted is the last of all. `hold` gives a number for the table and whether it
-/// is good enough; a run that diverges does not hold.
+/// Tries the values of a parameter in order. The measured value is the last one before the first failure (0
+/// if the first value fails); the reference value is the last of all. `hold` returns a number for the table
+/// and whether it is good enough. A diverged run counts as a failure.
 pub(super) fn sweep(
     parameter: &'static str,
     values: &[f64],
@@ -324,13 +326,13 @@ pub(super) fn sweep(
     Ok(Finding { sweep: Some(ParameterSweep { parameter, rows }), ..Finding::new(held, all, 0.0) })
 }
 
-/// Ground at height 0 of friction µ: a line of half length `half` (m).
+/// Ground at height 0 with the given friction: a line of half length `half` (m).
 pub(super) fn ground(half: f64, friction: f64) -> SceneBody {
     SceneBody::fixed([0.0, 0.0], SceneShape::line(half).friction(friction))
 }
 
-/// `shape` on a long plank that falls to the right by `angle` (rad), starting flush, its center
-/// `height` above it (m).
+/// `shape` on a long plank that descends to the right at `angle` (rad). The shape starts in contact, its
+/// center `height` above the plank (m).
 pub(super) fn on_slope(angle: f64, friction: f64, shape: SceneShape, height: f64) -> Scene {
     let (sin, cos) = angle.sin_cos();
     let plank = SceneShape::rectangle(40.0, 0.5).friction(friction);

@@ -1,4 +1,4 @@
-//! B24: piles that are barely stable by statics.
+//! B24: piles near the limit of static stability.
 
 use super::Required::Yes;
 use super::lab::*;
@@ -41,7 +41,8 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// B24. Every joint needs tan θ of its load as friction, and the weight acts 0.29 m off the middle of a half width of 0.5 m.
+/// B24. Every joint needs friction of tan θ times its load. The weight acts 0.29 m from the middle of a half
+/// width of 0.5 m.
 fn deck(lab: &Lab) -> Result<Finding, Failure> {
     let (friction, half) = (0.3, 0.05);
     let slope = f64::atan(friction / 1.03);
@@ -57,7 +58,8 @@ fn deck(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(largest(off), 0.0, 1e-4))
 }
 
-/// B24. The k-th brick from above may stand out by L/(2 k) over the next: all above it have their center of mass over its edge.
+/// B24. Brick k from the top may project by L/(2 k) over the next one: the center of mass of all bricks above
+/// is then at its edge.
 fn bricks(lab: &Lab) -> Result<Finding, Failure> {
     let (count, half, high) = (8, 1.0, 0.25);
     let found = bisect(0.9, 1.1, |part| {
@@ -74,14 +76,15 @@ fn bricks(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(found, 1.0, 1e-3))
 }
 
-/// B24. Two logs that touch and a third on them: with N between them at 30° from the vertical, a lower one rests without rolling if
-/// the friction F at both its contacts is the same, and N sin 30° = F (1 + cos 30°), so F/N = tan 15° = 2 − √3. The third weighs
-/// 2 (N cos 30° + F sin 30°) = 2 N, so the ground bears 3 N with F.
+/// B24. Two touching logs carry a third one with a normal force N at 30° from the vertical. A lower log rests
+/// without rolling if the friction F at both its contacts is the same and N sin 30° = F (1 + cos 30°), so F/N
+/// = tan 15° = 2 − √3. The third log weighs 2 (N cos 30° + F sin 30°) = 2 N, so each ground contact bears 3
+/// N, with the friction F.
 fn logs(lab: &Lab) -> Result<Finding, Failure> {
     let radius = 0.5;
     let between = 2.0 - 3f64.sqrt();
     let stands = |on_ground: f64, between: f64| -> Result<bool, Failure> {
-        // Two surfaces mix as the root of their product.
+        // Friction coefficients combine as the root of their product.
         let floor = ground(50.0, on_ground * on_ground / between);
         let log = |x: f64, y: f64| SceneBody::dynamic([x, y], SceneShape::disc(radius).friction(between));
         let top = radius * (1.0 + 3f64.sqrt());
@@ -95,8 +98,9 @@ fn logs(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 1.0, 0.01).note(format!("{below:.5} under, {beside:.5} between")))
 }
 
-/// B24. Discs of radius r in a shaft of width w touch with their line of centers at sin β = (w − 2 r)/2 r from the vertical: the
-/// floor bears 2 m g, each wall m g tan β, and they bear m g/cos β from each other.
+/// B24. Discs of radius r in a shaft of width w touch with their line of centers at sin β = (w − 2 r)/2 r
+/// from the vertical. The floor bears 2 m g, each wall m g tan β, and the contact between the discs m g/cos
+/// β.
 fn shaft(lab: &Lab) -> Result<Finding, Failure> {
     let (radius, width) = (0.5, 1.6);
     let sin: f64 = (width - 2.0 * radius) / (2.0 * radius);

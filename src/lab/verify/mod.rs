@@ -1,61 +1,64 @@
 //! Hard test cases with known analytic answers, run against every solver.
 //!
-//! A case runs a scene, reads one number from the state in `f64` and compares it with the known answer. It does not
-//! know which solver ran. A new case is one function and one row in the file of its group; [`CASES`] has them all. An
-//! id is a family (A: few bodies, B: many) and a name.
+//! A case runs a scene, reads one number from the state in `f64` and compares it with the known answer,
+//! independently of the solver. A new case is one function and one row in the file of its group; [`CASES`]
+//! lists them all. An id consists of a family (A: few bodies, B: many) and a name.
 //!
 //! # Tolerances
 //!
-//! They are requirements or follow from the derivation in the row, never from what passes. Failures are shown as
-//! failures.
+//! A tolerance is a requirement or follows from the derivation in its row. It is never fitted to the results,
+//! and failures are reported as failures.
 //!
 //! # What is required
 //!
-//! Each row says whether the default solver ([`crate::engine::solvers::DEFAULT`], soft contacts in substeps,
-//! shortened by the loads of statics) is required to pass, and on which promise that rests, or which promise is
-//! missing. The exit code of `simpulse verify` requires exactly those. A required case that fails stays required.
+//! Each row states whether the default solver ([`crate::engine::solvers::DEFAULT`]: soft contacts in
+//! substeps, shortened by the loads of statics) must pass, and which promise implies this or which promise is
+//! missing. The exit code of `simpulse verify` depends on exactly the required cases. A required case that
+//! fails stays required.
 //!
 //! | promise | because |
 //! |---|---|
-//! | free motion is exact on its discrete formula | semi-implicit Euler |
-//! | one body slides, sticks and rolls by Coulomb's law once loads are warm | friction rows are rigid, solved last |
-//! | columns stand | loads of statics are fed forward, at the places of the step, so a lean decays |
+//! | free motion follows its discrete formula exactly | semi-implicit Euler |
+//! | one body slides, sticks and rolls by Coulomb's law once contacts are warm-started | friction rows are rigid, solved last |
+//! | columns stand | loads of statics are fed forward for the positions of the current step, so a lean decays |
 //! | overlap at rest is at most F/(m ω²) | the spring's fixed point, for any number of iterations |
 //! | a pile comes to rest if the Gauss–Seidel rate leaves no error within the run | cos²(π/2N) and R/(1+R) per sweep |
 //! | overlap is pushed apart at 3 m/s at most | the push speed is limited |
-//! | the distance from the origin and the length of a step do not matter | positions keep their rounding error in a second float |
+//! | the distance from the origin and the step length do not matter | positions keep their rounding error in a second float |
 //! | a ball returns to e² of its height | the rebound keeps the discrete energy of flight |
-//! | impacts spread from body to body, with friction up to µ times their whole impulse | waves before the step; a plastic impact spreads from each pushed body to those that it touches |
-//! | impacts and pushes keep angular momentum | spins are corrected for the displacement of the arms |
+//! | impacts spread from body to body, with friction up to µ times their total impulse | waves before the step; a plastic impact spreads from each pushed body to those that it touches |
+//! | impacts and pushes conserve angular momentum | spins are corrected for the displacement of the arms |
 //! | discs roll without lifting off | their contact points do not turn with them |
 //! | on a static body friction acts at the moving body's surface, at any depth | contact points lie there, and midway between two dynamic bodies |
-//! | discs feel only what they touch | gaps of circles are taken at their closest approach |
-//! | scale does not matter | stiffness follows from the substep, no length enters |
+//! | discs react only to bodies that they touch | gaps of circles are taken at their closest approach |
+//! | scale does not matter | stiffness follows from the substep, not from a length |
 //!
-//! It does not promise:
+//! Not promised:
 //!
-//! - One solution where the sweeps of a step have not converged.
-//! - Heavy loads on light bodies before their loads are known: the depth F/(m ω²) itself may exceed the body.
-//! - **High stacks of soft contacts.** A contact between unit boxes has the effective mass 1/5 kg at each corner, so
-//!   the stiffness k = ω²/5 = 7106 N/m at 30 Hz, and against rotation K = 2 k (½)² = 3553 N m/rad. A column of N
-//!   links of 1 m with such joints and q = 10 N/m of weight buckles as Greenhill's beam does, at q N³ = 7.837 K: N =
-//!   14.1, and N ∝ f^⅔. More iterations do not help; the loads that the default solver feeds forward do
-//!   (`papers/shim.md`).
-//! - **Friction in the first substep.** A box on a slope has contact points ½ m below its center: k = 1 + (½)²·6 =
-//!   2.5, so the impulse that stops the points is 1/2.5 of the one that stops the box; the rest turns it. Two sweeps
-//!   with friction leave up to 0.6² g h sin θ, once, and friction that exceeds tan θ by little takes long to stop
-//!   that.
-//! - **Seams under boxes.** Contacts look ahead by 2 cm: a box that overlaps a floor of tiles by a micrometer sees the
-//!   side of the next tile (A24.tiles).
-//! - **Plastic impacts of many bodies.** Where an impact takes more visits than its bound, sweeps do the rest: two in
-//!   a substep, from whose impulses the next one starts.
-//! - **Rotating frames.** Within a step bodies move along tangents and contacts keep their normals: a body on a
-//!   turntable creeps outward (A26.turntable). Round contacts roll without lag under `shim` only.
-//! - **Sudden loads.** The first substep starts from the impulses of the previous step, even if their load was
-//!   removed or has moved to another contact (B23).
-//! - **The time of an impact.** Elastic impacts between free bodies other than discs happen at the start of the step.
-//! - **Rolling polygons and capsules.** Within a step, contact points turn with their body, as corners do; a rounded
-//!   body other than a disc that rolls by φ appears to lift off by r (1 − cos φ).
+//! - A unique solution before the sweeps of a step have converged.
+//! - Heavy loads on light bodies before the loads are known: the depth F/(m ω²) itself may exceed the size of
+//!   the body.
+//! - **High stacks of soft contacts.** A contact between unit boxes has the effective mass 1/5 kg at each
+//!   corner. Its stiffness is k = ω²/5 = 7106 N/m at 30 Hz, and K = 2 k (½)² = 3553 N m/rad against rotation.
+//!   A column of N links of 1 m with such joints and a weight of q = 10 N/m buckles like Greenhill's beam, at
+//!   q N³ = 7.837 K: N = 14.1, and N ∝ f^⅔. More iterations do not help; the loads that the default solver
+//!   feeds forward do (`papers/shim.md`).
+//! - **Friction in the first substep.** A box on a slope has its contact points ½ m below its center: k = 1 +
+//!   (½)²·6 = 2.5, so the impulse that stops the points is 1/2.5 of the one that stops the box. The rest
+//!   rotates the box. Two sweeps with friction leave a speed of up to 0.6² g h sin θ once. If µ exceeds tan θ
+//!   only slightly, friction takes long to stop it.
+//! - **Seams under boxes.** Contacts look ahead by 2 cm, so a box that overlaps a floor of tiles by a
+//!   micrometer collides with the side of the next tile (A24.tiles).
+//! - **Plastic impacts of many bodies.** If an impact needs more visits than its bound, sweeps do the rest:
+//!   two in each substep, starting from the impulses of the previous substep.
+//! - **Rotating frames.** Within a step, bodies move along tangents and contacts keep their normals, so a
+//!   body on a turntable creeps outward (A26.turntable). Round contacts roll without lag under `shim` only.
+//! - **Sudden loads.** The first substep starts from the impulses of the previous step, even if their load
+//!   was removed or moved to another contact (B23).
+//! - **The time of an impact.** Elastic impacts between free bodies other than discs are resolved at the
+//!   start of the step.
+//! - **Rolling polygons and capsules.** Within a step, contact points rotate with their body, as corners do.
+//!   A rounded body other than a disc that rolls by φ appears to lift off by r (1 − cos φ).
 
 mod balance;
 mod bullets;
@@ -92,19 +95,19 @@ use crate::engine::solvers::Variant;
 use crate::engine::world::Divergence;
 use crate::lab::error::Error;
 
-/// The solvers whose own law an answer follows.
+/// The solvers to whose contact law a reference value applies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LawOf {
-    /// All of them.
+    /// All solvers.
     Everyone,
-    /// Those whose contacts are springs at rest.
+    /// Solvers whose resting contacts are springs.
     Springs,
-    /// Those that sweep such contacts once per substep; the answer holds for each of their steps.
+    /// Solvers that sweep such contacts once per substep; the reference value holds for each of their steps.
     SpringsSweptOnce,
 }
 
 impl LawOf {
-    /// Whether the answer follows the law of this solver.
+    /// Whether the reference value applies to this solver.
     pub fn includes(self, solver: &Variant) -> bool {
         let springs = solver.softness.is_some();
         match self {
@@ -124,7 +127,7 @@ impl LawOf {
     }
 }
 
-/// A row of [`CASES`].
+/// One test case, a row of [`CASES`].
 pub struct Case {
     /// Family and name: `A1.stick`.
     pub id: &'static str,
@@ -134,9 +137,9 @@ pub struct Case {
     pub unit: &'static str,
     /// Source of the tolerance.
     pub tolerance: &'static str,
-    /// Whether the default solver must pass, and why.
+    /// Whether the default solver must pass, with the reason.
     pub required: Required,
-    /// The solvers whose own law the reference value follows.
+    /// The solvers to whose contact law the reference value applies.
     pub law_of: LawOf,
     /// Runs the case.
     pub measure: MeasureFn,
@@ -165,17 +168,17 @@ impl Case {
     }
 }
 
-/// Whether the mathematics of the default solver promises a case.
+/// Whether the mathematics of the default solver promises that a case passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Required {
-    /// It does, because …
+    /// Promised, for this reason.
     Yes(&'static str),
-    /// It does not, because …
+    /// Not promised, for this reason.
     No(&'static str),
 }
 
 impl Required {
-    /// Whether the exit code requires it.
+    /// Whether the exit code depends on the case.
     pub fn is_required(self) -> bool {
         matches!(self, Required::Yes(_))
     }
@@ -184,56 +187,57 @@ impl Required {
 /// Result of a case.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Finding {
-    /// As read from the run.
+    /// The measured value.
     pub measured: f64,
     /// The reference value.
     pub truth: f64,
     /// The tolerance, ≥ 0.
     pub tolerance: f64,
-    /// Further remarks; often empty.
+    /// Further remarks, often empty.
     pub note: String,
     /// If the reference value is a threshold, the sweep that found it.
     pub sweep: Option<ParameterSweep>,
 }
 
-/// A parameter tried value by value.
+/// Results of a sweep over one parameter.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct ParameterSweep {
-    /// Its name, with its unit.
+    /// Name and unit of the parameter.
     pub parameter: &'static str,
-    /// In the order tried.
+    /// One row per value, in the order tried.
     pub rows: Vec<SweepRow>,
 }
 
 /// A row of a [`ParameterSweep`].
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct SweepRow {
-    /// Of the parameter.
+    /// Value of the parameter.
     pub value: f64,
     /// The measured value; infinite if the run diverged.
     pub measured: f64,
-    /// Whether it is good enough.
+    /// Whether the measured value is good enough.
     pub holds: bool,
 }
 
 impl Finding {
-    /// A number beside its truth.
+    /// A measured value with its reference value and tolerance.
     pub fn new(measured: f64, truth: f64, tolerance: f64) -> Self {
         Finding { measured, truth, tolerance, note: String::new(), sweep: None }
     }
 
-    /// The same with a remark.
+    /// Adds a remark.
     pub fn note(self, note: impl Into<String>) -> Self {
         Finding { note: note.into(), ..self }
     }
 
-    /// Distance to the truth; infinite if the measured value is not a number.
+    /// Distance to the reference value; infinite if the measured value is not a number.
     pub fn error(&self) -> f64 {
         let error = (self.measured - self.truth).abs();
         if error.is_nan() { f64::INFINITY } else { error }
     }
 
-    /// Error in tolerances: 0 is exact, up to 1 passes. Where nothing is tolerated, 0 or infinite.
+    /// Error ÷ tolerance: 0 is exact, values up to 1 pass. With a tolerance of 0, the margin is 0 or
+    /// infinite.
     pub fn margin(&self) -> f64 {
         match (self.error(), self.tolerance) {
             (0.0, _) => 0.0,
@@ -247,19 +251,19 @@ impl Finding {
     }
 }
 
-/// Why a case has no number.
+/// Reason why a case yields no number.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
-    /// The simulation left all bounds.
+    /// The simulation diverged.
     #[error("{0}")]
     Diverged(Divergence),
-    /// The event to be measured never happened.
+    /// The event to be measured did not happen.
     #[error("not measured: {0}")]
     Unmeasured(String),
-    /// The solver does not hold what the scene has.
+    /// The scene has joints, which the solver does not support.
     #[error("{0}")]
     NotHeld(Error),
-    /// The case itself is wrong.
+    /// The case itself is invalid.
     #[error(transparent)]
     Refused(#[from] Error),
 }

@@ -1,4 +1,4 @@
-//! A0, A16, A17 and B14: bodies that move freely, and how small or large a step may be.
+//! A0, A16, A17 and B14: freely moving bodies, and limits of the step length.
 
 use super::Required::Yes;
 use super::lab::*;
@@ -78,13 +78,13 @@ fn fall(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("free_fall", 1e-5 * 10.0)
 }
 
-/// A16. θ = ω t: 50 rad/s for 2 s are 100 rad.
+/// A16. θ = ω t: 50 rad/s for 2 s make 100 rad.
 fn free_spin(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("free_spin:50", 1e-5 * 100.0)
 }
 
-/// A17. Two squads of eight boxes and discs fly into each other, without walls and weight: linear and
-/// angular momentum are what they were, each relative to the sum of its absolute parts.
+/// A17. Two groups of eight boxes and discs fly into each other, without walls or gravity. Linear and angular
+/// momentum are conserved. Each change is relative to the sum of the absolute values of its parts.
 fn drift(lab: &Lab, angular: bool) -> Result<Finding, Failure> {
     let mut bodies = Vec::new();
     for i in 0..16 {
@@ -140,8 +140,8 @@ fn momentum(world: &World) -> Momentum {
     sum
 }
 
-/// B14. The worst relative error of the distance that a box slides and a disc rolls down the incline
-/// of A1 and A3 in two seconds, against the discrete formula, for steps from 1/15 s to 1/1000 s.
+/// B14. A box slides and a disc rolls down the inclines of A1 and A3 for two seconds. Measures the largest
+/// relative error of the distance compared with the discrete formula, for steps from 1/15 s to 1/1000 s.
 fn large_steps(lab: &Lab) -> Result<Finding, Failure> {
     let steps = [1.0 / 1000.0, 1.0 / 240.0, 1.0 / 120.0, 1.0 / 60.0, 1.0 / 30.0, 1.0 / 15.0];
     let mut found = sweep("dt (s)", &steps, |dt| {
@@ -156,15 +156,15 @@ fn large_steps(lab: &Lab) -> Result<Finding, Failure> {
     Ok(found)
 }
 
-/// B14. A first-order scheme's error halves with the step: the ratio of the errors of the sliding distance
-/// against the continuous parabola, at 1/60 s and 1/120 s.
+/// B14. The error of a first-order scheme halves with the step. Measures the ratio of the errors of the
+/// sliding distance compared with the continuous parabola, at 1/60 s and 1/120 s.
 fn order(lab: &Lab) -> Result<Finding, Failure> {
     let (_, coarse) = slid(lab, "incline_slip", 1.0 / 60.0)?;
     let (_, fine) = slid(lab, "incline_slip", 1.0 / 120.0)?;
     Ok(Finding::new(coarse / fine, 2.0, 0.2))
 }
 
-/// Relative errors of the distance after two seconds, against the discrete and the continuous formula.
+/// Relative errors of the distance after two seconds, compared with the discrete and the continuous formula.
 fn slid(lab: &Lab, name: &str, dt: f64) -> Result<(f64, f64), Failure> {
     let (slope, friction): (f64, f64) = (0.25, 0.24);
     let a = match name {
@@ -179,10 +179,10 @@ fn slid(lab: &Lab, name: &str, dt: f64) -> Result<(f64, f64), Failure> {
     Ok((distance / (parabola * (1.0 + 1.0 / n)) - 1.0, distance / parabola - 1.0))
 }
 
-/// B14. How far the first step of 1 µs moves a body at rest at 1.5 m, over what it should: n substeps
-/// of h move it by g h² (1 + … + n) = g dt² (1 + 1/n)/2, 6 pm. `f32`s are 0.12 µm apart there: a scheme
-/// that adds this to a position of one `f32` stands still (below steps of 77 µs), one that keeps
-/// what the sum rounds away does not.
+/// B14. Displacement of a body at rest at 1.5 m in its first step of 1 µs, divided by the exact value. n
+/// substeps of h move it by g h² (1 + … + n) = g dt² (1 + 1/n)/2, which is 6 pm. `f32`s are spaced by 0.12 µm
+/// there. A scheme with positions in a single `f32` stands still for steps below 77 µs; one that keeps the
+/// rounding error of the sum does not.
 fn freeze(lab: &Lab) -> Result<Finding, Failure> {
     let (start, dt) = (1.5, 1e-6);
     let mut world = lab.world(thrown(start, dt))?;
@@ -191,7 +191,7 @@ fn freeze(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new((start - center(&world, 0)[1]) / truth, 1.0, 0.01))
 }
 
-/// B14. The shortest step at which 2000 steps of a fall from rest at 1.5 m are right to 1 %.
+/// B14. The shortest step at which 2000 steps of a fall from rest at 1.5 m are accurate to 1 %.
 fn tiny_steps(lab: &Lab) -> Result<Finding, Failure> {
     let steps = [1.0 / 60.0, 1e-3, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6];
     sweep("dt (s)", &steps, |dt| {

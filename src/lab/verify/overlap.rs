@@ -59,10 +59,10 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// B3. A disc a quarter of a meter deep in the ground: the worst difference from the soft contact's own
-/// recovery over half a second, which a substep advances by d' = d − h min(γ β d, v_max) + γ_i g h²
-/// with ω = 2π 60 Hz, ζ = 10. Positions are read at 0.25 to 0.5 m, where `f32`s are 2⁻²⁵ m apart: 30
-/// steps may be half of that off each.
+/// B3. A disc starts a quarter of a meter deep in the ground. Measures the largest deviation from the soft
+/// contact's own recovery over half a second. Each substep gives d' = d − h min(γ β d, v_max) + γ_i g h² with
+/// ω = 2π 60 Hz and ζ = 10. Positions lie between 0.25 and 0.5 m, where `f32`s are spaced by 2⁻²⁵ m, and each
+/// of 30 steps may round by half of that.
 fn soft_recovery(lab: &Lab) -> Result<Finding, Failure> {
     let disc = SceneBody::dynamic([0.0, 0.25], SceneShape::disc(0.5));
     let scene = Scene::new("recovery", vec![ground(20.0, 0.6), disc]);
@@ -75,7 +75,7 @@ fn soft_recovery(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 0.0, 30.0 * 2f64.powi(-26)))
 }
 
-/// The depth one substep later.
+/// Depth one substep later.
 fn recovered(depth: f64, h: f64) -> f64 {
     let omega = TAU * 2.0 * f64::from(CONTACT_HERTZ);
     let damping = 2.0 * f64::from(CONTACT_DAMPING_RATIO) + h * omega;
@@ -84,7 +84,7 @@ fn recovered(depth: f64, h: f64) -> f64 {
     depth - h * push + G * h * h / (1.0 + a)
 }
 
-/// B3. Overlap is no energy: bodies that were pushed apart rest.
+/// B3. Overlap stores no energy: bodies come to rest after they were pushed apart.
 fn apart(lab: &Lab) -> Result<Finding, Failure> {
     let square = |x: f64| SceneBody::dynamic([x, 0.0], SceneShape::rectangle(0.5, 0.5));
     let scene = Scene::new("apart", vec![square(-0.4), square(0.4)]).weightless();
@@ -95,24 +95,24 @@ fn apart(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(rms_speed(&world), 0.0, tolerance).note(format!("gap {gap:.1e} m")))
 }
 
-/// B3. A pile of ten boxes that start a quarter deep in each other ends at rest on the ground, whose
-/// load is the weight.
+/// B3. A pile of ten boxes that start overlapping by a quarter ends at rest on the ground. The ground load is
+/// the weight.
 fn pile(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("overlap_recovery", load_tolerance(10.0, 1.0 / 60.0))
 }
 
-/// What the over-full box did.
+/// Results of a run of the overfull box.
 struct Confined {
     /// Greatest rms speed (m/s).
     peak: f64,
-    /// Of the last second.
+    /// Greatest rms speed in the last second (m/s).
     end: f64,
-    /// Greatest overlap over the mean overlap, at the end.
+    /// Greatest overlap ÷ mean overlap, at the end.
     share: f64,
 }
 
-/// B19. 625 discs in a box with room for less than 450: 491 m² of discs in 390 m², where 0.9069 is the
-/// densest packing. No gravity.
+/// B19. 625 discs in a box with room for fewer than 450: 491 m² of discs in 390 m², where the densest packing
+/// has the density 0.9069. No gravity.
 fn confined(lab: &Lab) -> Result<Confined, Failure> {
     let corners = [[-10.5, 0.0], [10.5, 0.0], [10.5, 20.5], [-10.5, 20.5]];
     let mut bodies: Vec<_> = (0..4)
@@ -140,7 +140,7 @@ fn confined(lab: &Lab) -> Result<Confined, Failure> {
     Ok(found)
 }
 
-/// Largest over mean of the positive ones; infinite where there are none.
+/// Largest ÷ mean positive depth; infinite if no depth is positive.
 fn share(depths: impl Iterator<Item = f64>) -> f64 {
     let (sum, count, most) = depths
         .filter(|d| *d > 0.0)
@@ -148,23 +148,23 @@ fn share(depths: impl Iterator<Item = f64>) -> f64 {
     if sum > 0.0 { most / (sum / count) } else { f64::INFINITY }
 }
 
-/// B19. Kinetic energy is bounded: if each of the 12 contacts between the center and a wall opens at
-/// the cap of 3 m/s, speeds grow from 0 to 36 m/s along x and y, √(2/3) of that in the mean.
+/// B19. Kinetic energy is bounded. If each of the 12 contacts between the center and a wall opens at the
+/// limit of 3 m/s, speeds along x and y grow from 0 at the center to 36 m/s; the rms is √(2/3) of that.
 fn confined_peak(lab: &Lab) -> Result<Finding, Failure> {
     let bound = (2.0f64 / 3.0).sqrt() * 12.0 * f64::from(MAX_PUSH_SPEED);
     Ok(Finding::new(confined(lab)?.peak, 0.0, bound))
 }
 
-/// B19. It decays: the rms speed of the last of ten seconds is below a tenth of the peak, the energy
-/// below a hundredth.
+/// B19. The motion decays: the rms speed in the last of ten seconds is below a tenth of the peak, so the
+/// energy is below a hundredth.
 fn confined_decay(lab: &Lab) -> Result<Finding, Failure> {
     let found = confined(lab)?;
-    // What never moved has nothing left.
+    // Nothing remains if nothing ever moved.
     let left = if found.peak == 0.0 { 0.0 } else { found.end / found.peak };
     Ok(Finding::new(left, 0.0, 0.1).note(format!("{:.1e} m/s at the end", found.end)))
 }
 
-/// B19. The overlap is shared.
+/// B19. The overlap is distributed evenly.
 fn confined_share(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(confined(lab)?.share, 1.0, 2.0))
 }
@@ -176,7 +176,8 @@ mod tests {
     #[test]
     fn recovery_has_the_rate_and_the_time_of_the_list() {
         let h = 1.0 / 240.0;
-        // Without weight's share, the factor is 0.929267 below the cap, which is reached at 0.17672 m.
+        // Without the term of gravity, the factor is 0.929267 below the speed limit, which is reached at
+        // 0.17672 m.
         let rate = |d: f64| (recovered(d, h) - recovered(0.0, h)) / d;
         assert!((rate(0.1) - 0.929267).abs() < 1e-6);
         assert!((rate(0.1767) - 0.929267).abs() < 1e-6 && rate(0.1768) > 0.92928);
@@ -187,7 +188,7 @@ mod tests {
             substeps += 1;
         }
         assert_eq!(substeps, 55);
-        // At rest it is g/ω².
+        // The depth at rest is g/ω².
         let rest = (0..1000).fold(depth, |d, _| recovered(d, h));
         assert!((rest - soft_depth(G, 1.0, true)).abs() < 1e-12);
     }

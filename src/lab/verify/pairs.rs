@@ -1,4 +1,4 @@
-//! A20–A22: two bodies that both move.
+//! A20–A22: two moving bodies.
 
 use super::Required::{No, Yes};
 use super::lab::*;
@@ -97,7 +97,7 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// A body in an impact: mass (kg), inertia (kg·m²), arm (m), velocity (m/s), spin (rad/s).
+/// State of a body before an impact: mass (kg), inertia (kg·m²), arm (m), velocity (m/s), spin (rad/s).
 #[derive(Clone, Copy)]
 struct Hit {
     mass: f64,
@@ -108,7 +108,7 @@ struct Hit {
 }
 
 impl Hit {
-    /// Velocity of the point that is hit.
+    /// Velocity of the contact point (m/s).
     fn point(&self) -> [f64; 2] {
         [self.velocity[0] - self.spin * self.arm[1], self.velocity[1] + self.spin * self.arm[0]]
     }
@@ -121,8 +121,8 @@ impl Hit {
     }
 }
 
-/// Velocities of a, below, and b after an impact along n = (0, 1) under Newton's law and Coulomb's on the
-/// impulses of all of it (see A19): v_n⁺ = −e v_n, and along t what stops the points, or ±µ N.
+/// Velocities of a (below) and b after an impact along n = (0, 1). Newton's law gives v_n⁺ = −e v_n.
+/// Coulomb's law holds for the total impulses (see A19): the tangential impulse stops the points or is ±µ N.
 fn after_hit(a: &Hit, b: &Hit, e: f64, mu: f64) -> [[f64; 3]; 2] {
     let (pa, pb) = (a.point(), b.point());
     let (vt, vn) = (pb[0] - pa[0], pb[1] - pa[1]);
@@ -136,7 +136,8 @@ fn after_hit(a: &Hit, b: &Hit, e: f64, mu: f64) -> [[f64; 3]; 2] {
     [a.after([-tangent, -normal]), b.after([tangent, normal])]
 }
 
-/// The worst difference from [`after_hit`] over restitutions and frictions (m/s, spins at their arms).
+/// The largest deviation from [`after_hit`] over restitutions and frictions (m/s; spins are multiplied by
+/// their arms).
 fn rough_hit(
     lab: &Lab,
     bodies: &[(Hit, SceneShape, f64); 2],
@@ -173,7 +174,7 @@ fn rough_discs(lab: &Lab) -> Result<Finding, Failure> {
     rough_hit(lab, &two_discs(), BOUNCING)
 }
 
-/// Restitutions of what bounces.
+/// Restitutions of bouncing bodies.
 const BOUNCING: &[f64] = &[0.2, 0.5, 0.9];
 
 fn two_discs() -> [(Hit, SceneShape, f64); 2] {
@@ -186,12 +187,12 @@ fn two_discs() -> [(Hit, SceneShape, f64); 2] {
     [disc(0.8, 1.0, -1.0, [-1.0, 0.5], 1.5), disc(0.5, 2.0, 1.0, [2.0, -3.5], 3.0)]
 }
 
-/// A20. A corner of one box on the upper face of another, away from the middle of both.
+/// A20. A corner of one box hits the upper face of another, off the middle of both.
 fn rough_boxes(lab: &Lab) -> Result<Finding, Failure> {
     rough_hit(lab, &corner_on_box(), BOUNCING)
 }
 
-/// A20. Without restitution the law is the same.
+/// A20. The same law without restitution.
 fn caught(lab: &Lab) -> Result<Finding, Failure> {
     let [discs, corner] = [rough_hit(lab, &two_discs(), &[0.0])?, rough_hit(lab, &corner_on_box(), &[0.0])?];
     Ok(worse(discs, corner))
@@ -213,8 +214,8 @@ fn corner_on_box() -> [(Hit, SceneShape, f64); 2] {
     [(lower, plank, 0.0), (upper, square, 25f64.to_radians())]
 }
 
-/// A20. With gaps of 1 mm each disc hits the next and stays behind at (m − M)/(m + M) of its speed, −1/3; the
-/// next has 2/3 of it.
+/// A20. With gaps of 1 mm, each disc hits the next one and keeps (m − M)/(m + M) of its speed, −1/3. The next
+/// one gets 2/3 of it.
 fn chain(lab: &Lab) -> Result<Finding, Failure> {
     let speed = 4.0;
     let disc = |mass: f64| SceneShape::disc(0.5).density(4.0 * mass / PI).friction(0.0).restitution(1.0);
@@ -231,8 +232,8 @@ fn chain(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(off, 0.0, 1e-4).note(format!("speeds {found:.4?}")))
 }
 
-/// A20. A disc of 3 kg that falls on the ground at v meets one of 1 kg that falls 2 mm above it. Both elastic: the lower
-/// one stops, the upper one leaves at 2 v.
+/// A20. A disc of 3 kg that falls at v bounces off the ground and hits one of 1 kg that falls 2 mm above it.
+/// Both are elastic: the lower disc stops, the upper one leaves at 2 v.
 fn stacked(lab: &Lab) -> Result<Finding, Failure> {
     let speed = 5.0;
     let disc = |mass: f64| SceneShape::disc(0.5).density(4.0 * mass / PI).friction(0.0).restitution(1.0);
@@ -244,7 +245,7 @@ fn stacked(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(off, 0.0, 0.01).note(format!("speeds {found:.4?}")))
 }
 
-/// A20. Five boxes go on together, at a fifth of the first one's speed.
+/// A20. Five boxes move on together, at a fifth of the first one's speed.
 fn plastic_row(lab: &Lab) -> Result<Finding, Failure> {
     let square = || SceneShape::rectangle(0.5, 0.5).friction(0.0);
     let mut bodies = vec![SceneBody::dynamic([-1.3, 0.0], square()).moving([5.0, 0.0], 0.0)];
@@ -255,7 +256,7 @@ fn plastic_row(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(off, 0.0, 0.01).note(format!("speeds {found:.4?}")))
 }
 
-/// A20. Σ m_i v_i/Σ m_i, whatever the masses and wherever in the row the fast one stands.
+/// A20. The common speed is Σ m_i v_i/Σ m_i, for any masses.
 fn coupling(lab: &Lab) -> Result<Finding, Failure> {
     let mass = |i: u32| f64::from(1 + i % 4);
     let square = |i: u32| SceneShape::rectangle(0.5, 0.5).density(mass(i)).friction(0.0);
@@ -268,7 +269,7 @@ fn coupling(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(off, 0.0, 0.01).note(format!("speeds {found:.4?}")))
 }
 
-/// A20. Without a touch nothing changes.
+/// A20. Discs that pass without touching do not change their velocities.
 fn near_miss(lab: &Lab) -> Result<Finding, Failure> {
     let mut worst = 0.0;
     for clearance in [0.001, 0.005, 0.015] {
@@ -285,17 +286,18 @@ fn near_miss(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 0.0, 1e-5 * 5.0))
 }
 
-/// A21. A block of 1 kg on a wedge of 2 kg at an angle α, all smooth. The wedge is pushed away at
+/// A21. A block of 1 kg on a wedge of 2 kg with the angle α, all frictionless. The wedge accelerates away at
 /// A = m g sin α cos α/(M + m sin² α).
 fn wedge(lab: &Lab) -> Result<Finding, Failure> {
     let (m, big, alpha) = (1.0, 2.0, 30f64.to_radians());
     let (sin, cos) = alpha.sin_cos();
-    // Falls to the right, from 4 m high at the left; its center of mass is at a third of base and height.
+    // The wedge descends to the right from 4 m at the left. Its center of mass is at a third of base and
+    // height.
     let (base, high) = (4.0 * cos / sin, 4.0);
     let triangle = SceneShape::polygon(vec![[0.0, 0.0], [base, 0.0], [0.0, high]]);
     let density = big / (0.5 * base * high);
     let wedge = SceneBody::dynamic([0.0, 0.0], triangle.density(density).friction(0.0));
-    // Flush, half a meter from the top.
+    // The block starts in contact, half a meter from the top.
     let at = [0.5 * cos + 0.25 * sin, high - 0.5 * sin + 0.25 * cos];
     let block = SceneShape::rectangle(0.25, 0.25).density(m / 0.25).friction(0.0);
     let bodies = vec![ground(60.0, 0.0), wedge, SceneBody::dynamic(at, block).turned(-alpha)];
@@ -310,7 +312,7 @@ fn wedge(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(start - center(&world, 1)[0], truth, 0.01 * truth).note(note))
 }
 
-/// A plank of 2 kg on ice at rest, and a body of 1 kg on it at 4 m/s.
+/// A plank of 2 kg rests on frictionless ground, and a body of 1 kg moves on it at 4 m/s.
 fn on_plank(lab: &Lab, shape: SceneShape, height: f64, mu: f64) -> Result<[f64; 4], Failure> {
     let plank = SceneShape::rectangle(10.0, 0.25).density(0.2).friction(mu);
     let rider = SceneBody::dynamic([-5.0, 0.5 + height], shape.friction(mu)).moving([4.0, 0.0], 0.0);
@@ -320,7 +322,8 @@ fn on_plank(lab: &Lab, shape: SceneShape, height: f64, mu: f64) -> Result<[f64; 
     Ok([slip, velocity(&world, 1)[0], velocity(&world, 2)[0], time(&world)])
 }
 
-/// A22. Both decelerate by µ g (1 + m/M) against each other: the slip is v0²/(2 µ g (1 + m/M)), in steps less by v0 h/2.
+/// A22. Relative deceleration is µ g (1 + m/M), so the slip is v0²/(2 µ g (1 + m/M)). Discrete steps reduce
+/// it by v0 h/2.
 fn box_on_plank(lab: &Lab) -> Result<Finding, Failure> {
     let mu = 0.4;
     let [slip, plank, rider, _] = on_plank(lab, SceneShape::rectangle(0.5, 0.5), 0.5, mu)?;
@@ -330,7 +333,8 @@ fn box_on_plank(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(slip, truth, 0.01 * truth).note(note))
 }
 
-/// A22. v (2 + m/M)/(3 + m/M): momentum is kept, and half of what the disc loses spins it.
+/// A22. The final speed is v (2 + m/M)/(3 + m/M): momentum is conserved, and friction spins the disc up until
+/// it rolls.
 fn disc_on_plank(lab: &Lab) -> Result<Finding, Failure> {
     let disc = SceneShape::disc(0.5).density(4.0 / PI);
     let [_, plank, rider, _] = on_plank(lab, disc, 0.5, 0.4)?;
@@ -355,13 +359,13 @@ mod tests {
             assert!((2.0 * va[0] + vb[0] - 1.0).abs() < 1e-14 && (2.0 * va[1] + vb[1] + 1.0).abs() < 1e-14);
             let after = energy(&a, va) + energy(&b, vb);
             assert!(if mu == 0.0 { (after - before).abs() < 1e-14 } else { after < before });
-            // Angular momentum about the point that is hit.
+            // Angular momentum about the contact point.
             let about =
                 |h: &Hit, v: [f64; 3]| h.mass * (h.arm[1] * v[0] - h.arm[0] * v[1]) + h.inertia * v[2];
             let start = about(&a, [0.0, 1.0, 1.0]) + about(&b, [1.0, -3.0, 1.0]);
             assert!((about(&a, va) + about(&b, vb) - start).abs() < 1e-13);
             if mu == 5.0 {
-                // Both points move alike along t.
+                // Both points have the same velocity along t.
                 let point = |h: &Hit, v: [f64; 3]| v[0] - v[2] * h.arm[1];
                 assert!((point(&a, va) - point(&b, vb)).abs() < 1e-14);
             }

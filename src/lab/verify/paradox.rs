@@ -1,4 +1,4 @@
-//! B10 and B12: whether rest is possible at all, and Painlevé's rod.
+//! B10 and B12: static equilibrium of leaning cards, and Painlevé's rod.
 
 use super::Required::{No, Yes};
 use super::lab::*;
@@ -45,14 +45,14 @@ pub(super) static CASES: &[Case] = &[
 /// Angle of a card from the vertical (rad).
 const LEAN: f64 = 25.0 * std::f64::consts::PI / 180.0;
 
-/// B10. Least friction at the feet of two leaning cards, by statics alone. Moments
-/// about the top of one card: tan φ (W/2 + P)/(W + P) for a load P on its top; here the worst of P = 0,
-/// W and 10 W, relative.
+/// B10. Least friction at the feet of two leaning cards, from statics alone. Moments about the top of one
+/// card give tan φ (W/2 + P)/(W + P) for a load P on its top. Measures the largest relative error for P = 0,
+/// W and 10 W.
 fn cards_in_statics(_: &Lab) -> Result<Finding, Failure> {
     let mut worst = 0.0;
     for extra in [0.0, 1.0, 10.0] {
         let truth = LEAN.tan() * (0.5 + extra) / (1.0 + extra);
-        // Thirty bisections: nine digits.
+        // Thirty bisections give nine digits.
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..30 {
             let middle = 0.5 * (low + high);
@@ -64,7 +64,8 @@ fn cards_in_statics(_: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 0.0, 1e-6))
 }
 
-/// Two cards of 1 kg and length 1, a load of `extra` kg on the top of each, with friction `base` at the feet.
+/// Two cards of 1 kg and length 1, with a load of `extra` kg on the top of each and friction `base` at the
+/// feet.
 fn a_frame(base: f64, extra: f64) -> (ContactProblem, Vec<Velocity>) {
     let (sin, cos) = LEAN.sin_cos();
     let body = ProblemBody { inv_mass: 1.0, inv_inertia: 12.0, velocity: [0.0; 3], free_velocity: [0.0; 3] };
@@ -85,14 +86,15 @@ fn a_frame(base: f64, extra: f64) -> (ContactProblem, Vec<Velocity>) {
     )
 }
 
-/// Half length and half thickness of a simulated card (m): long, so that overlap hardly changes its angle.
+/// Half length and half thickness of a simulated card (m). The card is long, so that overlap hardly changes
+/// its angle.
 const CARD: [f64; 2] = [2.0, 0.02];
 
-/// B10. The same by simulation, P = 0: the friction below which the tops drop by 5 cm in three seconds.
-/// A card of half length l and half thickness t stands on the inner corner of its foot and leans with
-/// the outer one of its top, so its center is t cos φ nearer to the line through the top: µ = tan φ/2 −
-/// t/(2l). Overlap of a slop at foot and top turns the card by up to slop/(l cos φ) and the threshold
-/// by that over 2 cos² φ: 0.7 % here, and a drop of 5 cm shows 0.1 % in three seconds.
+/// B10. The same by simulation with P = 0: the friction below which the tops drop by 5 cm in three seconds. A
+/// card of half length l and half thickness t stands on the inner corner of its foot and leans with the outer
+/// corner of its top. Its center is therefore t cos φ nearer to the line through the top, and µ = tan φ/2 −
+/// t/(2l). Overlap of one slop at foot and top turns the card by up to slop/(l cos φ) and changes the
+/// threshold by that over 2 cos² φ: 0.7 % here. A drop of 5 cm in three seconds resolves 0.1 %.
 fn cards_in_motion(lab: &Lab) -> Result<Finding, Failure> {
     let truth = 0.5 * LEAN.tan() - CARD[1] / (2.0 * CARD[0]);
     let found = bisect(0.0, 2.0 * truth, |friction| {
@@ -104,7 +106,7 @@ fn cards_in_motion(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(found, truth, 0.01 * truth))
 }
 
-/// Friction 1 between the cards and `friction` at their feet: surfaces mix as √(µa µb).
+/// Friction 1 between the cards and `friction` at their feet: coefficients combine as √(µa µb).
 fn cards(friction: f64) -> Scene {
     let ([l, t], (sin, cos)) = (CARD, LEAN.sin_cos());
     // The outer corner of the top is at x = 0, the inner corner of the foot at y = 0.
@@ -115,15 +117,16 @@ fn cards(friction: f64) -> Scene {
     Scene::new("cards", vec![ground(20.0, friction * friction), card(1.0), card(-1.0)])
 }
 
-/// B12. A rod of 1 kg and half length 1 m slides at 1 m/s on its lower end, tan θ = 2, µ = 2: pressing
-/// the end down, friction would need (1.6 − 1.2 µ) λn = g h, so the end sticks: an impact without a
-/// collision, λn = 0.3 + 0.85 g h. Impulse of the first step, and speed of the end after it; steps of 1
-/// ms, twice the term in h for what substeps after the first add.
+/// B12. A rod of 1 kg and half length 1 m slides at 1 m/s on its lower end, with tan θ = 2 and µ = 2. While
+/// it slides, friction presses the end down and (1.6 − 1.2 µ) λn = g h has no solution, so the end sticks: an
+/// impact without a collision, λn = 0.3 + 0.85 g h. Returns the impulse of the first step and the speed of
+/// the end after it. Steps are 1 ms long; the tolerance is twice the term in h, to cover what the substeps
+/// after the first add.
 fn rod(lab: &Lab) -> Result<[f64; 2], Failure> {
     let (sin, cos) = (2.0 / 5f64.sqrt(), 1.0 / 5f64.sqrt());
     let thickness = 1e-4;
     let shape = SceneShape::rectangle(1.0, thickness).density(0.25 / thickness).friction(2.0);
-    // Sliding to the right with the lower end in front.
+    // The rod slides to the right with its lower end in front.
     let height = sin + thickness * cos;
     let rod = SceneBody::dynamic([0.0, height], shape).turned(-sin.atan2(cos)).moving([1.0, 0.0], 0.0);
     let scene = Scene { dt: ROD_STEP, ..Scene::new("rod", vec![ground(5.0, 2.0), rod]) };
@@ -134,15 +137,15 @@ fn rod(lab: &Lab) -> Result<[f64; 2], Failure> {
     Ok([normal, (vx + w * sin).hypot(vy + w * cos)])
 }
 
-/// s
+/// Step length for the rod (s).
 const ROD_STEP: f64 = 1e-3;
 
-/// B12. λn (N·s).
+/// B12. The impulse λn (N·s).
 fn rod_impulse(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(rod(lab)?[0], 0.3, 2.0 * 0.85 * G * ROD_STEP))
 }
 
-/// B12. The end's speed: below a hundredth of what it was.
+/// B12. Speed of the end: below a hundredth of its initial value.
 fn rod_end(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(rod(lab)?[1], 0.0, 0.01))
 }

@@ -1,4 +1,4 @@
-//! A9, A10, A13–A15: oscillators, pendulums, and what joints take from their energy.
+//! A9, A10, A13–A15: oscillators, pendulums, and the energy that joints dissipate.
 
 use super::Required::{No, Yes};
 use super::lab::*;
@@ -105,7 +105,7 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// A block of 1 kg on a spring of 100 N/m, whose rest is at 0; friction 0.2 or what it is on.
+/// A block of 1 kg on a spring of 100 N/m with its rest position at 0. `friction` is the block's coefficient.
 fn on_spring(ground: SceneBody, start: f64, friction: f64) -> Scene {
     let half = 0.1;
     let block = SceneShape::rectangle(0.5, half).density(10.0).friction(friction);
@@ -119,7 +119,7 @@ fn on_spring(ground: SceneBody, start: f64, friction: f64) -> Scene {
     Scene::new("oscillator", bodies).joined(vec![SceneJoint::new(1, 2, JointKind::Distance(spring))])
 }
 
-/// Extremes of a sampled function: times and values, by a parabola through three samples.
+/// Extremes of a sampled function: times and values, from a parabola through three samples.
 fn turns(samples: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut turns = vec![];
     for window in samples.windows(3) {
@@ -146,7 +146,7 @@ fn watch(
     Ok(samples)
 }
 
-/// A9. Every half period takes 2 µ N/k = 0.04 m.
+/// A9. Every half period reduces the amplitude by 2 µ N/k = 0.04 m.
 fn damped_turn(lab: &Lab) -> Result<Finding, Failure> {
     let samples = watch(lab, on_spring(ground(40.0, 0.2), 1.0, 0.2), 5.0, |w| center(w, 2)[0])?;
     let turns = turns(&samples);
@@ -154,14 +154,15 @@ fn damped_turn(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(amplitude.abs(), 0.6, 0.01))
 }
 
-/// A9. After 25 half periods, at 7.85 s.
+/// A9. The block stops after 25 half periods, at 7.85 s.
 fn damped_stop(lab: &Lab) -> Result<Finding, Failure> {
     let world = lab.run(on_spring(ground(40.0, 0.2), 1.0, 0.2), 12.0, |_| ())?;
     let speed = velocity(&world, 2)[0].abs();
     Ok(Finding::new(center(&world, 2)[0], 0.0, 0.02).note(format!("speed {speed:.1e} m/s")))
 }
 
-/// A10. It sticks to x = µ m g/k = 0.03 m and then swings about there with V/ω = 0.05 m, without decay.
+/// A10. The block sticks until x = µ m g/k = 0.03 m, then oscillates about that point with the amplitude V/ω
+/// = 0.05 m, without decay.
 fn on_belt(lab: &Lab) -> Result<Vec<(f64, f64)>, Failure> {
     let belt = SceneShape::rectangle(60.0, 0.5).friction(0.3);
     let belt = SceneBody::new(BodyKind::Kinematic, [0.0, -0.5], belt).moving([0.5, 0.0], 0.0);
@@ -188,12 +189,12 @@ fn belt_period(lab: &Lab) -> Result<Finding, Failure> {
 /// Width of the rods (m).
 const WIDTH: f64 = 0.02;
 
-/// A rod of 1 m that hangs from `top`, at an angle from the lowest place (rad).
+/// A rod of 1 m that hangs from `top`, at an angle from its lowest position (rad).
 fn rod(top: [f64; 2], angle: f64) -> SceneBody {
     let (sin, cos) = angle.sin_cos();
     let shape = SceneShape::rectangle(0.5 * WIDTH, 0.5).density(1.0 / WIDTH);
     let rod = SceneBody::dynamic([top[0] + 0.5 * sin, top[1] - 0.5 * cos], shape).turned(angle);
-    // Nothing here collides.
+    // Group −1 turns collisions off.
     SceneBody { group: -1, ..rod }
 }
 
@@ -206,18 +207,19 @@ fn pinned(angle: f64) -> Scene {
     Scene::new("pendulum", bodies).joined(vec![SceneJoint::revolute(0, 1, [0.0, 0.0], [0.0, 0.5])])
 }
 
-/// Angle of a rod, from the lowest place, within half a turn (rad).
+/// Angle of a rod from its lowest position, within half a turn (rad).
 fn angle(world: &World, i: usize) -> f64 {
     f64::from(world.bodies.angle(i))
 }
 
-/// Moment of inertia of the rod about its end, over m L² (1).
+/// Moment of inertia of the rod about its end, as a multiple of m L² (1).
 fn about_end() -> f64 {
     (1.0 + WIDTH * WIDTH) / 12.0 + 0.25
 }
 
-/// A13. Time and angular velocity at which the rod passes the side; ½ J ω² = m g ½ (cos 0.1 − cos φ), by Simpson's rule in
-/// φ = 0.1 cosh s, which takes the slow start out.
+/// A13. Time and angular velocity at which the rod passes the horizontal. The speed follows from ½ J ω² = m g
+/// ½ (cos 0.1 − cos φ), the time from Simpson's rule with φ = 0.1 cosh s, which removes the singularity at
+/// the slow start.
 fn fall(lab: &Lab) -> Result<([f64; 2], [f64; 2]), Failure> {
     let mut before = (0.0, PI - 0.1, 0.0);
     let mut found = None;
@@ -251,7 +253,8 @@ fn fall_speed(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(w, truth, 0.01 * truth))
 }
 
-/// K(k) by the arithmetic-geometric mean, over π/2: the period in that of small swings, k = sin(θ/2).
+/// K(k) ÷ (π/2) by the arithmetic-geometric mean, with k = sin(θ/2): the period relative to that of small
+/// oscillations.
 fn elliptic(amplitude: f64) -> f64 {
     let (mut a, mut b) = (1.0, (0.5 * amplitude).cos());
     for _ in 0..10 {
@@ -260,7 +263,7 @@ fn elliptic(amplitude: f64) -> f64 {
     1.0 / a
 }
 
-/// Mean of five periods from the lowest place to the lowest place, over the true one.
+/// Mean of five periods between passages of the lowest position, divided by the exact period.
 fn periods(lab: &Lab, amplitude: f64) -> Result<f64, Failure> {
     let truth = elliptic(amplitude) * TAU * (about_end() / (0.5 * G)).sqrt();
     let (mut crossings, mut before) = (vec![], (0.0, amplitude));
@@ -311,8 +314,9 @@ fn double_energy(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("double_pendulum", 0.01)
 }
 
-/// A15. Two equal rods from their lowest places by θ and φ, of unit length, mass m and moment J about their middle:
-/// T = ½ (J + ¼ m + m) θ'² + ½ (J + ¼ m) φ'² + ½ m θ' φ' cos(θ − φ), V = −m g (3/2 cos θ + ½ cos φ), by Runge–Kutta's rule.
+/// A15. Accelerations of two equal rods at the angles θ and φ from their lowest positions, with unit length,
+/// mass m and moment J about their centers: T = ½ (J + ¼ m + m) θ'² + ½ (J + ¼ m) φ'² + ½ m θ' φ' cos(θ − φ),
+/// V = −m g (3/2 cos θ + ½ cos φ). The reference path integrates them by the Runge–Kutta rule.
 fn accelerations([a, b, u, v]: [f64; 4]) -> [f64; 4] {
     let j = (1.0 + WIDTH * WIDTH) / 12.0;
     let (sin, cos) = (a - b).sin_cos();

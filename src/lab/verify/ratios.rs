@@ -1,4 +1,4 @@
-//! B4: heavy discs on light ones, and light ones on heavy.
+//! B4: heavy discs on light ones, and light discs on heavy ones.
 
 use super::Required::Yes;
 use super::lab::*;
@@ -33,12 +33,12 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// B4. A heavy disc of 100 kg on one of 1 kg, ground load in the last second.
+/// B4. A disc of 100 kg on one of 1 kg: ground load in the last second.
 fn hundred(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("mass_ratio:100", load_tolerance(101.0, 1.0 / 60.0))
 }
 
-/// B4. The greatest ratio, heavy on light, that rests after ten seconds.
+/// B4. The greatest mass ratio, heavy on light, at which the pair rests after ten seconds.
 fn heavy_on_light(lab: &Lab) -> Result<Finding, Failure> {
     sweep("mass ratio", RATIOS, |ratio| rests(lab, [1.0, ratio]))
 }
@@ -50,9 +50,9 @@ fn light_on_heavy(lab: &Lab) -> Result<Finding, Failure> {
 
 const RATIOS: &[f64] = &[1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4];
 
-/// Two discs of these masses (kg), lower first. At rest means: in order, no deeper than the slop or a
-/// soft contact under its load, kinetic energy below 1e-6 J per kg. The table shows the depth of the
-/// upper contact.
+/// Two discs of these masses (kg), the lower one first. They rest if they keep their order, sink no deeper
+/// than the slop or a soft contact under its load, and have a kinetic energy below 1e-6 J per kg. The table
+/// lists the depth of the upper contact.
 fn rests(lab: &Lab, masses: [f64; 2]) -> Result<(f64, bool), Failure> {
     let disc = |i: usize| {
         let shape = SceneShape::disc(0.5).density(4.0 * masses[i] / PI);
@@ -72,7 +72,7 @@ fn rests(lab: &Lab, masses: [f64; 2]) -> Result<(f64, bool), Failure> {
         soft_depth((masses[0] + masses[1]) * G, masses[0], true).max(SLOP),
         soft_depth(masses[1] * G, reduced, false).max(SLOP),
     ];
-    // A hundredth for what is left of the approach to the fixed point.
+    // One percent covers the rest of the approach to the fixed point.
     let shallow = 0.5 - low[1] <= 1.01 * allowed[0] && upper <= 1.01 * allowed[1];
     Ok((upper, upper < 0.5 && high[0].abs() < 0.5 && shallow && energy < 1e-6))
 }

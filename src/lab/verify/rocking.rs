@@ -1,4 +1,4 @@
-//! A26: bodies that rock and roll where the place of their contact moves.
+//! A26: bodies that rock or roll, with moving contact points.
 
 use super::Required::{No, Yes};
 use super::lab::*;
@@ -61,12 +61,13 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// rad, of a body that turns by less than π.
+/// Angle of a body that turns by less than π (rad).
 fn angle(world: &World, i: usize) -> f64 {
     f64::from(world.bodies.rotation_sin[i]).atan2(f64::from(world.bodies.rotation_cos[i]))
 }
 
-/// The greatest angle of body 1 in the last `period` of 10 s, over that in the first. Rolling takes no energy, so it is 1.
+/// Greatest angle of body 1 in the last `period` of 10 s, divided by that in the first. Rolling dissipates no
+/// energy, so the reference value is 1.
 fn growth(lab: &Lab, scene: Scene, period: f64) -> Result<Finding, Failure> {
     let seconds = 10.0;
     let (mut first, mut last) = (0.0, 0.0);
@@ -82,8 +83,9 @@ fn growth(lab: &Lab, scene: Scene, period: f64) -> Result<Finding, Failure> {
     Ok(Finding::new(last / first, 1.0, 0.01))
 }
 
-/// A26. A plank of thickness 2 b on a fixed disc of radius R, rolled by φ from its middle: the contact is at R (sin φ, cos φ),
-/// and the middle of the plank's lower face R φ before it. T = 2π √((k² + b²)/(g (R − b))).
+/// A26. A plank of thickness 2 b on a fixed disc of radius R, rolled by φ from its middle. The contact is at
+/// R (sin φ, cos φ), and the middle of the plank's lower face is R φ uphill of it. T = 2π √((k² + b²)/(g (R −
+/// b))).
 fn plank(lab: &Lab) -> Result<Finding, Failure> {
     let (radius, half, b, start) = (1.0, 1.0, 0.1, 0.05f64);
     let (sin, cos) = start.sin_cos();
@@ -96,8 +98,8 @@ fn plank(lab: &Lab) -> Result<Finding, Failure> {
     growth(lab, Scene::new("plank", vec![support, plank]), period)
 }
 
-/// A26. A light disc of radius R with a dense core of radius r, d below its center; its center of mass is e below it.
-/// T = 2π √((I + m (R − e)²)/(m g e)).
+/// A26. A light disc of radius R with a dense core of radius r, d below the disc's center. The center of mass
+/// is e below the disc's center. T = 2π √((I + m (R − e)²)/(m g e)).
 fn eccentric(lab: &Lab) -> Result<Finding, Failure> {
     let (radius, core, below, dense, start) = (0.5, 0.1, 0.3, 100.0, 0.1);
     let heavy = Geometry::Circle(Circle { center: [0.0, -below], radius: core });
@@ -112,8 +114,9 @@ fn eccentric(lab: &Lab) -> Result<Finding, Failure> {
     growth(lab, Scene::new("eccentric", vec![ground(50.0, 1.0), disc]), period)
 }
 
-/// A26. Housner's block, 2 b wide and 2 h high with tan α = b/h, turns about one lower corner and then about the other: angular
-/// momentum about the new one leaves it 1 − 3/2 sin²α of its spin. Energy five steps after over that a step before.
+/// A26. Housner's block, 2 b wide and 2 h high with tan α = b/h, turns about one lower corner and then about
+/// the other. Angular momentum about the new corner leaves 1 − 3/2 sin²α of the spin. Measures the energy
+/// five steps after the angle changes sign, divided by the energy two steps before.
 fn block(lab: &Lab) -> Result<Finding, Failure> {
     let (b, h, start) = (1.0, 4.0, -0.15f64);
     let ((sin, cos), friction) = (start.sin_cos(), 1e3);
@@ -135,8 +138,8 @@ fn block(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(after / before, truth, 0.01 * truth))
 }
 
-/// A26. Rollers d left and right of the middle pull a plank inwards with µ N₁ and µ N₂ at its lower face, b below its center:
-/// N₁ − N₂ = −m g x/(d − µ b), so that T = 2π √((d − µ b)/(µ g)).
+/// A26. Rollers d to the left and right of the middle pull a plank inward with µ N₁ and µ N₂ at its lower
+/// face, b below its center: N₁ − N₂ = −m g x/(d − µ b), so T = 2π √((d − µ b)/(µ g)).
 fn rollers(lab: &Lab) -> Result<Finding, Failure> {
     let (friction, d, b, radius, start) = (0.3, 1.0, 0.01, 0.25, 0.2);
     let roller = |side: f64| {
@@ -161,8 +164,8 @@ fn rollers(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(period, truth, 0.01 * truth))
 }
 
-/// A26. A disc that turns against the clock on the floor is pressed to the wall on its left by µ N, which carries µ² N of its weight:
-/// N = m g/(1 + µ²), and ω' = −2 µ (1 + µ) g/((1 + µ²) r).
+/// A26. A disc spins counterclockwise on the floor. Friction µ N presses it against the wall on its left,
+/// which carries µ² N of its weight: N = m g/(1 + µ²), and ω' = −2 µ (1 + µ) g/((1 + µ²) r).
 fn corner(lab: &Lab) -> Result<Finding, Failure> {
     let (friction, radius, start, seconds) = (0.4, 0.5, 20.0, 0.5);
     let wall = SceneBody::fixed([0.0, 0.0], SceneShape::line(20.0).friction(friction)).turned(PI / 2.0);
@@ -174,8 +177,8 @@ fn corner(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(spin(&world, 2), truth, 5e-3 * truth))
 }
 
-/// A26. A square frame turns at 3 rad/s without weight; a box lies on the inside of a wall, 1 m from its middle and 3.5 m from the
-/// axis along the normal. What it needs is µ = 1/3.5, what it has is 0.6.
+/// A26. A square frame rotates at 3 rad/s without gravity. A box lies on the inside of a wall, 1 m from the
+/// wall's middle and 3.5 m from the axis along the normal. It needs µ = 1/3.5 to stay and has 0.6.
 fn turntable(lab: &Lab) -> Result<Finding, Failure> {
     let (rate, inner, half, aside) = (3.0, 4.0, 0.5, 1.0);
     let mut frame = SceneBody::new(

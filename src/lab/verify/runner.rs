@@ -1,4 +1,4 @@
-//! Cases × solvers, on several threads.
+//! Runs cases × solvers on several threads.
 
 use super::table::CASES;
 use super::{Case, Failure, Finding, Lab};
@@ -10,16 +10,17 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Result of one case with one solver.
 #[derive(Debug)]
 pub enum Cell {
-    /// A number beside its truth.
+    /// A measured value with its reference value.
     Found(Finding),
-    /// No number: the run diverged, or what was to be measured did not happen.
+    /// No number: the run diverged, or the event to be measured did not happen.
     Failed(Failure),
-    /// The truth is another solver's own law, or the scene has joints and the solver holds none.
+    /// Not applicable: the reference value follows another contact law, or the scene has joints and the
+    /// solver supports none.
     Foreign,
 }
 
 impl Cell {
-    /// Whether it passed; none where the case says nothing about this solver.
+    /// Whether the case passed; `None` if it does not apply to this solver.
     pub fn passed(&self) -> Option<bool> {
         match self {
             Cell::Found(finding) => Some(finding.passed()),
@@ -31,16 +32,17 @@ impl Cell {
 
 /// All results.
 pub struct VerifyMatrix {
-    /// Rows.
+    /// The rows.
     pub cases: Vec<&'static Case>,
-    /// Columns.
+    /// The columns.
     pub solvers: Vec<&'static Variant>,
     /// One vector per case, one cell per solver.
     pub cells: Vec<Vec<Cell>>,
 }
 
 impl VerifyMatrix {
-    /// Ids of the required cases that `solver` did not pass; none where it is not in the matrix.
+    /// Ids of the required cases that `solver` did not pass; `None` if the matrix does not include the
+    /// solver.
     pub fn broken_promises(&self, solver: &str) -> Option<Vec<&'static str>> {
         let column = self.solvers.iter().position(|s| s.name == solver)?;
         let broken = self
@@ -52,7 +54,7 @@ impl VerifyMatrix {
     }
 }
 
-/// The cases that `wanted` names: `A1.stick` is one, `A1` its family, nothing all of them.
+/// The selected cases: `A1.stick` selects one case, `A1` its family, an empty list all cases.
 ///
 /// Errors: a name that is neither a case nor a family.
 pub fn select(wanted: &[String]) -> Result<Vec<&'static Case>, Error> {
@@ -70,19 +72,19 @@ pub fn select(wanted: &[String]) -> Result<Vec<&'static Case>, Error> {
     Ok(CASES.iter().copied().filter(chosen).collect())
 }
 
-/// What has just begun.
+/// Progress report at the start of a run.
 #[derive(Clone, Debug)]
 pub struct CaseProgress {
-    /// Runs that are finished.
+    /// Number of finished runs.
     pub done: usize,
-    /// Runs in all.
+    /// Total number of runs.
     pub total: usize,
-    /// Case and solver.
+    /// Case and solver of the run.
     pub what: String,
 }
 
-/// Runs every case with every laboratory that `lab` makes of a solver, on `threads` threads. The
-/// results do not depend on their number: runs share nothing.
+/// Runs every case with the laboratory that `lab` builds for each solver, on `threads` threads. Runs share no
+/// state, so the results do not depend on the number of threads.
 pub fn run(
     cases: Vec<&'static Case>,
     solvers: Vec<&'static Variant>,
@@ -103,7 +105,7 @@ pub fn run(
             let what = format!("{} with {}", case.id, solver.name);
             tell(CaseProgress { done: done.load(Ordering::Relaxed), total, what });
             let cell = judge(case, &lab(solver), solver);
-            // A thread that panics takes the scope down with it: no slot is read poisoned.
+            // A panicking thread aborts the whole scope, so no poisoned slot is ever read.
             if let Ok(mut slot) = slots[i].lock() {
                 *slot = cell;
             }

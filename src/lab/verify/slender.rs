@@ -1,4 +1,4 @@
-//! B24: narrow structures that are stable by statics.
+//! B24: slender structures that are statically stable.
 
 use super::Required::Yes;
 use super::lab::*;
@@ -40,7 +40,7 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// The greatest distance of a body from where it began (m), in all steps of `seconds`.
+/// The greatest distance of a body from its start position (m), over all steps of `seconds`.
 fn movement(lab: &Lab, scene: Scene, push: Option<f64>, seconds: f64) -> Result<Finding, Failure> {
     let mut world = lab.world(scene)?;
     if let Some(push) = push {
@@ -60,8 +60,9 @@ fn movement(lab: &Lab, scene: Scene, push: Option<f64>, seconds: f64) -> Result<
     Ok(Finding::new(most, 0.0, SLOP))
 }
 
-/// B24. A row of n unit boxes on a wall needs friction for n m g, n/µ times the weight of one, and at the wall's joint a moment of
-/// n²/2 m g, which a push through its middle gives up to half of itself: 25 m g for five.
+/// B24. A row of n unit boxes pressed against a wall needs friction for the weight n m g, which takes a push
+/// of n/µ times the weight of one box. The joint at the wall needs a moment of n²/2 m g. A push through its
+/// middle provides up to half of itself: 25 m g for five boxes.
 fn pressed(lab: &Lab) -> Result<Finding, Failure> {
     let wall = SceneBody::fixed([-0.5, 0.0], SceneShape::rectangle(0.5, 20.0));
     let mut bodies = vec![wall];

@@ -137,15 +137,15 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// rad
+/// Angle of the inclines (rad).
 const SLOPE: f64 = 0.25;
 
-/// A1. µ = 0.26 > tan 0.25 = 0.2553: the worst drift in a minute.
+/// A1. µ = 0.26 > tan 0.25 = 0.2553: the largest drift in a minute.
 fn stick(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("incline_stick", 1e-4)
 }
 
-/// A1. The same, its speed from 30 s on.
+/// A1. The same box: its speed after 30 s.
 fn creep(lab: &Lab) -> Result<Finding, Failure> {
     let scene = lab.scene("incline_stick")?;
     let mut path = Vec::new();
@@ -162,9 +162,9 @@ fn slip(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("incline_slip", 0.01 * 0.2973)
 }
 
-/// A1. The slope from which a unit box accelerates is atan µ, whatever speed it starts with: it slides
-/// if after two seconds it is faster than after one. Beyond the threshold by ε it gains µ g cos θ ε in
-/// that second: a gain of 5e-5 m/s tells the threshold to 1e-4 or better for µ ≥ 0.1.
+/// A1. A unit box accelerates above a slope of atan µ, whatever its initial speed. It slides if it is faster
+/// after two seconds than after one. At an excess of ε above the threshold it gains µ g cos θ ε in that
+/// second, so a gain of 5e-5 m/s resolves the threshold to 1e-4 or better for µ ≥ 0.1.
 fn slope_threshold(lab: &Lab) -> Result<Finding, Failure> {
     let mut found = sweep("µ", &[0.1, 0.3, 0.6], |friction| {
         let tangent = bisect(0.0, 2.0 * friction, |tangent: f64| {
@@ -189,8 +189,8 @@ fn worst(found: &Finding) -> f64 {
     largest(found.sweep.iter().flat_map(|sweep| &sweep.rows).map(|row| row.measured.abs()))
 }
 
-/// A1. A box of 2 kg and side 1 that slides on the flat with µ = 0.3 leans forward: moments about its
-/// center give N = m g/2 (1 ± µ H/w), 13 N in front.
+/// A1. A box of 2 kg and side 1 that slides on level ground with µ = 0.3 loads its front edge more. Moments
+/// about its center give N = m g/2 (1 ± µ H/w), 13 N in front.
 fn split(lab: &Lab) -> Result<Finding, Failure> {
     let (mass, friction) = (2.0, 0.3);
     let shape = SceneShape::rectangle(0.5, 0.5).density(mass).friction(friction);
@@ -209,12 +209,12 @@ fn split(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(sum / count, truth, 0.01 * truth))
 }
 
-/// A2. Against the discrete sum, over 1.5 m.
+/// A2. Compared with the discrete sum, over 1.5 m.
 fn stop(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("sliding_stop", 0.01 * 1.5)
 }
 
-/// A3. 0.5 % of the 3.299 m that a = 2/3 g sin θ makes in two seconds.
+/// A3. 0.5 % of the distance of 3.299 m that a = 2/3 g sin θ gives in two seconds.
 fn roll(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("rolling_incline", 0.005 * 3.299)
 }
@@ -224,7 +224,7 @@ fn slipping_disc(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("slipping_disc", 0.005 * 3.979)
 }
 
-/// A3. Speed of the rolling disc's contact point, from half a second on.
+/// A3. Speed of the rolling disc's contact point, after half a second.
 fn slip_speed(lab: &Lab) -> Result<Finding, Failure> {
     let mut fastest = 0.0;
     lab.run(lab.scene("rolling_incline")?, 2.0, |world| {
@@ -235,13 +235,13 @@ fn slip_speed(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(fastest, 0.0, 1e-4))
 }
 
-/// Downhill to the right is clockwise: v + ω r, with ω < 0.
+/// Slip speed v + ω r of the contact point. A disc rolling downhill to the right turns clockwise, so ω < 0.
 fn disc_slip(world: &crate::engine::world::World) -> f64 {
     downhill(velocity(world, 1), SLOPE) + 0.5 * spin(world, 1)
 }
 
-/// A3. The friction that rolling needs is tan θ/3. Below it by ε the contact slips by g sin θ ε t: 5e-4
-/// m/s after 2 s tell 1e-4.
+/// A3. Rolling needs the friction tan θ/3. At ε below that, the contact slips at g sin θ ε t, so 5e-4 m/s
+/// after 2 s resolve 1e-4.
 fn roll_threshold(lab: &Lab) -> Result<Finding, Failure> {
     let truth = SLOPE.tan() / 3.0;
     let friction = bisect(0.0, 2.0 * truth, |friction| {
@@ -251,13 +251,12 @@ fn roll_threshold(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(friction, truth, 1e-3 * truth))
 }
 
-/// m/s
+/// Initial speed (m/s).
 const START: f64 = 5.0;
 
-/// A4. Sliding turns into rolling at 2/3 v0 whatever µ is, because angular momentum about the line of
-/// contact is kept. What can be off is the arm: overlap by up to the slop shortens it by half of that,
-/// δ, and with v = v0/(1 + r²/(2 a²)), a = r − δ, the speed falls by 2/3 δ/r v0 … of first order; here
-/// r = 0.5 m.
+/// A4. Sliding turns into rolling at 2/3 v0 for any µ, because angular momentum about the line of contact is
+/// conserved. Only the arm can be inaccurate: overlap of up to the slop shortens it by half of that, δ. With
+/// v = v0/(1 + r²/(2 a²)) and a = r − δ, the speed falls by 4/9 δ/r v0 to first order; here r = 0.5 m.
 fn slide_to_roll(lab: &Lab) -> Result<Finding, Failure> {
     let mut found = sweep("µ", &[0.05, 0.2, 0.6, 2.0], |friction| {
         let speed = rolling_speed(lab, friction, 0.0)?;
@@ -271,17 +270,17 @@ fn slide_to_roll(lab: &Lab) -> Result<Finding, Failure> {
     Ok(found)
 }
 
-/// δ/r with δ half a slop and r = 0.5 m.
+/// δ/r, where δ is half a slop and r = 0.5 m.
 const ARM: f64 = 0.5 * SLOP / 0.5;
 
-/// A4. With back-spin w0 the speed becomes (2 v0 − r w0)/3: for r w0 = 3 v0 it comes back at v0/3. The
-/// shorter arm a = r − δ gives v = (v0 − r² w0/(2a))/(1 + r²/(2a²)): off by 7/9 δ/r v0.
+/// A4. With back-spin w0 the speed becomes (2 v0 − r w0)/3. For r w0 = 3 v0 the disc comes back at v0/3. The
+/// shorter arm a = r − δ gives v = (v0 − r² w0/(2a))/(1 + r²/(2a²)), an error of 7/9 δ/r v0.
 fn back_spin(lab: &Lab) -> Result<Finding, Failure> {
     let speed = rolling_speed(lab, 0.5, 3.0 * START / 0.5)?;
     Ok(Finding::new(speed, -START / 3.0, 7.0 / 9.0 * ARM * START))
 }
 
-/// A4. 2/3 v0, whatever pushes it out on the way: friction acts at the radius.
+/// A4. The speed is 2/3 v0 even while overlap is pushed out: friction acts at the radius.
 fn deep_roll(lab: &Lab) -> Result<Finding, Failure> {
     let friction = 0.2;
     let disc = SceneBody::dynamic([0.0, 0.45], SceneShape::disc(0.5).friction(friction));
@@ -290,7 +289,8 @@ fn deep_roll(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(velocity(&world, 1)[0], 2.0 / 3.0 * START, 1e-4))
 }
 
-/// A4. Every impulse goes through the line of contact: I w0 = (I + m r²) w, however it bounces before it rolls.
+/// A4. Every impulse passes through the line of contact, so I w0 = (I + m r²) w, however the disc bounces
+/// before it rolls.
 fn dropped_spin(lab: &Lab) -> Result<Finding, Failure> {
     let (radius, spin) = (0.5, 20.0);
     let shape = SceneShape::disc(radius).friction(0.3).restitution(0.5);
@@ -300,7 +300,7 @@ fn dropped_spin(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(velocity(&world, 1)[0], truth, 7.0 / 9.0 * ARM * radius * spin))
 }
 
-/// Speed at 2 v0/(µ g), twice as late as sliding could last.
+/// Speed at 2 v0/(µ g), twice the longest time of sliding.
 fn rolling_speed(lab: &Lab, friction: f64, back_spin: f64) -> Result<f64, Failure> {
     let disc = SceneBody::dynamic([0.0, 0.5], SceneShape::disc(0.5).friction(friction));
     let bodies = vec![ground(100.0, friction), disc.moving([START, 0.0], back_spin)];
@@ -308,8 +308,8 @@ fn rolling_speed(lab: &Lab, friction: f64, back_spin: f64) -> Result<f64, Failur
     Ok(velocity(&world, 1)[0])
 }
 
-/// A8. A box laid on a belt of speed V slips on it by Σ (V − j µ g h) h until it has caught up:
-/// V²/(2 µ g) − V h/2.
+/// A8. A box placed on a belt of speed V slips by Σ (V − j µ g h) h until it has caught up: V²/(2 µ g) − V
+/// h/2.
 fn conveyor(lab: &Lab) -> Result<Finding, Failure> {
     let (speed, friction) = (2.0, 0.5);
     let belt = SceneShape::rectangle(50.0, 0.5).friction(friction);
@@ -322,8 +322,8 @@ fn conveyor(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(slipped, truth - 0.5 * speed * h, 0.01 * truth))
 }
 
-/// B13. A box that slides with µ = 0.5 stays on the ground. The convex relaxation of Coulomb's law has
-/// un = µ |ut| instead and lifts it: at 2 m/s by 3.3 cm.
+/// B13. A box that slides with µ = 0.5 stays on the ground. The convex relaxation of Coulomb's law has un =
+/// µ |ut| instead and lifts the box: by 3.3 cm at 2 m/s.
 fn hop(lab: &Lab) -> Result<Finding, Failure> {
     let friction = 0.5;
     let shape = SceneShape::rectangle(0.5, 0.25).friction(friction);

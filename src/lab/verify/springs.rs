@@ -116,7 +116,8 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// A disc of 1 kg on a spring along x, 1 m off its rest, without weight. It is that of a slider, whose error is small where x is.
+/// A disc of 1 kg on a spring along x, 1 m from its rest position, without gravity. The spring belongs to a
+/// slider, whose error is small where x is small.
 fn swing(omega: f64, zeta: f64) -> Scene {
     let radius = (1.0 / PI).sqrt();
     let bodies = vec![
@@ -133,13 +134,14 @@ fn substep(lab: &Lab) -> f64 {
     1.0 / 60.0 / lab.substeps()
 }
 
-/// Rate of decay and angular frequency of a swing: x_n = 2 c x_{n−1} − d x_{n−2} by least squares, with z^dt = e^(−rate ± iω) dt.
+/// Decay rate and angular frequency of an oscillation. Fits x_n = 2 c x_{n−1} − d x_{n−2} by least squares,
+/// with z^dt = e^(−rate ± iω) dt.
 fn motion(lab: &Lab, omega: f64, zeta: f64) -> Result<[f64; 2], Failure> {
     let mut samples = vec![1.0];
     let dt = 1.0 / 60.0;
     let seconds = (7.0 / (zeta * omega)).min(6.0 * TAU / omega).max(8.0 * dt);
     lab.run(swing(omega, zeta), seconds, |world| samples.push(center(world, 1)[0]))?;
-    // The start is a step of its own: velocities are those behind a substep.
+    // The first sample does not count: velocities lag positions by a substep.
     let rows: Vec<[f64; 3]> =
         samples[1..].windows(3).map(|w| [w[0], w[1], w[2]]).filter(|w| w[0].abs() > 1e-4).collect();
     let sum = |of: fn(&[f64; 3]) -> f64| rows.iter().map(of).sum::<f64>();
@@ -150,7 +152,8 @@ fn motion(lab: &Lab, omega: f64, zeta: f64) -> Result<[f64; 2], Failure> {
     Ok([-0.5 * d.ln() / dt, (c / d.sqrt()).clamp(-1.0, 1.0).acos() / dt])
 }
 
-/// ζ and ωh at which a step holds less than half a swing, so that its frequency can be told.
+/// Pairs of ζ and ωh at which a step spans less than half an oscillation, so that its frequency can be
+/// measured.
 fn grid(lab: &Lab) -> impl Iterator<Item = [f64; 2]> {
     let most = 2.8 / lab.substeps();
     let pairs = [0.05, 0.1, 0.2, 0.5, 0.8].into_iter();
@@ -159,7 +162,7 @@ fn grid(lab: &Lab) -> impl Iterator<Item = [f64; 2]> {
         .filter(move |[_, y]| *y <= most)
 }
 
-/// A32. A = e^(−2ζωh) takes e^(−ζωt) from both roots.
+/// A32. A = e^(−2ζωh) multiplies both roots by e^(−ζωt).
 fn decay(lab: &Lab) -> Result<Finding, Failure> {
     let mut worst = Finding::new(1.0, 1.0, 0.01);
     for [zeta, y] in grid(lab) {
@@ -172,8 +175,8 @@ fn decay(lab: &Lab) -> Result<Finding, Failure> {
     Ok(worst)
 }
 
-/// A32. The roots of z² − (1 + A − (ωh)² A) z + A = 0 with A = e^(−2ζωh) are at ±θ, cos θ = cosh ζωh − (ωh)² e^(−ζωh)/2. To
-/// first order that is off by ζωh/2(1 − ζ²).
+/// A32. The roots of z² − (1 + A − (ωh)² A) z + A = 0 with A = e^(−2ζωh) have the angles ±θ, cos θ = cosh ζωh
+/// − (ωh)² e^(−ζωh)/2. To first order the frequency is off by ζωh/2(1 − ζ²).
 fn own_frequency(lab: &Lab) -> Result<Finding, Failure> {
     let mut worst = Finding::new(1.0, 1.0, 0.01);
     for [zeta, y] in grid(lab) {
@@ -198,7 +201,7 @@ fn frequency(lab: &Lab) -> Result<Finding, Failure> {
     })
 }
 
-/// A32. Critically damped, at rest under its own weight: x = g/ω².
+/// A32. Critically damped and at rest under its own weight: x = g/ω².
 fn deflection(lab: &Lab) -> Result<Finding, Failure> {
     let mut worst = Finding::new(1.0, 1.0, 1e-3);
     for y in [0.05, 0.1, 0.5, 1.0, 2.0] {
@@ -216,7 +219,8 @@ fn deflection(lab: &Lab) -> Result<Finding, Failure> {
     Ok(worst)
 }
 
-/// Without damping x² − ωh x v/ω + v²/ω² is kept, an ellipse that reaches 1/√(1 − (ωh)²/4) of its value at v = 0.
+/// Without damping, x² − ωh x v/ω + v²/ω² is conserved. This ellipse reaches 1/√(1 − (ωh)²/4) times its value
+/// at v = 0.
 const ORBIT: f64 = 0.032_796;
 
 /// A32.
@@ -236,7 +240,7 @@ fn stiff(lab: &Lab) -> Result<Finding, Failure> {
     Ok(worst)
 }
 
-/// A rod of 1 kg and 1 m that hangs from the origin at an angle from the lowest place (rad), on this hinge.
+/// A rod of 1 kg and 1 m on a hinge at the origin, at an angle from its lowest position (rad).
 fn hinged(angle: f64, hinge: Revolute) -> Scene {
     let (sin, cos) = angle.sin_cos();
     let rod = SceneShape::rectangle(0.05, 0.5).density(10.0);
@@ -252,7 +256,7 @@ fn driven(speed: f64, max: f64) -> Revolute {
     Revolute { motor: Some(Motor { speed, max }), ..Revolute::default() }
 }
 
-/// A disc with a motor on its middle: nothing else acts on it.
+/// A disc with a motor at its center and no other forces.
 fn wheel(motor: Revolute) -> Scene {
     let bodies = vec![
         SceneBody::fixed([0.0, 0.0], SceneShape::disc(0.05)),
@@ -281,7 +285,7 @@ fn motor_cap(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(spin(&world, 1) * inertia / 0.5, 1.0, 1e-4))
 }
 
-/// A33. Held at the side, the weight's torque is ½ m g.
+/// A33. Held horizontally, the rod needs the torque ½ m g.
 fn stall(lab: &Lab) -> Result<Finding, Failure> {
     let found = bisect(0.9, 1.1, |part| {
         let world = lab.run(hinged(FRAC_PI_2, driven(0.0, part * 0.5 * G)), 4.0, |_| ())?;
@@ -290,7 +294,7 @@ fn stall(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(found, 1.0, 0.005))
 }
 
-/// A33. A rod that falls from the side onto limits 0.3 rad behind its lowest place, and swings on.
+/// A33. A rod falls from the horizontal onto a limit 0.3 rad beyond its lowest position and swings on.
 fn limit(lab: &Lab) -> Result<Finding, Failure> {
     let hinge = Revolute { limits: Some([-0.3, 2.0]), ..Revolute::default() };
     let mut worst = 0.0;
@@ -301,7 +305,7 @@ fn limit(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 0.0, 1e-3))
 }
 
-/// A33. Two free rods without weight; one turns against the other until its limit, and from there back.
+/// A33. Two free rods without gravity. One turns relative to the other up to its limit and back.
 fn limit_energy(lab: &Lab) -> Result<Finding, Failure> {
     let rod = || SceneShape::rectangle(0.5, 0.05).density(10.0);
     let bodies = vec![
@@ -325,7 +329,7 @@ fn limit_energy(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(gain / start, 0.0, 1e-3))
 }
 
-/// A slider without weight that hits its limit at 5 m.
+/// A slider without gravity that hits its limit at 5 m. Returns its final position (m) and speed (m/s).
 fn slider(lab: &Lab) -> Result<[f64; 2], Failure> {
     let rail = Prismatic { limits: Some([-5.0, 5.0]), ..Prismatic::default() };
     let bodies = vec![

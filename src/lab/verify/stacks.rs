@@ -74,8 +74,8 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// B6. Boxes of sides 1, 2, 4 … 32 m, the smallest below: ground load over the last second of ten, if
-/// the largest is still on top.
+/// B6. Boxes of sides 1, 2, 4 … 32 m, the smallest at the bottom: ground load over the last of ten seconds,
+/// if the largest box is still on top.
 fn doubling(lab: &Lab) -> Result<Finding, Failure> {
     let mut bodies = vec![ground(50.0, 0.6)];
     let mut base = 0.0;
@@ -92,7 +92,7 @@ fn doubling(lab: &Lab) -> Result<Finding, Failure> {
             worst = if (load - weight).abs() >= (worst - weight).abs() { load } else { worst };
         }
     })?;
-    // Its bottom stands 31 m high.
+    // Its underside starts at a height of 31 m.
     let lowest = center(&world, 6)[1] - 16.0;
     let on_top = lowest > 31.0 - 0.5;
     let note = format!("underside of the largest at {lowest:.2} m of 31");
@@ -105,13 +105,14 @@ fn pyramid(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("pyramid:10", load_tolerance(55.0, 1.0 / 60.0))
 }
 
-/// B7. Of 5050 boxes.
+/// B7. A pyramid of 5050 boxes.
 fn large_pyramid(lab: &Lab) -> Result<Finding, Failure> {
     lab.catalog("large_pyramid", load_tolerance(5050.0, 1.0 / 60.0))
 }
 
-/// B8. A plank on three discs: single loads are not determined, their sum and moment are. The larger of
-/// the relative error of the sum and the moment over weight times half length, in the last second.
+/// B8. A plank on three discs. The individual loads are indeterminate, but their sum and moment are not.
+/// Measures the larger of the relative error of the sum and the moment relative to weight × half length, in
+/// the last second.
 fn plank(lab: &Lab) -> Result<Finding, Failure> {
     let half = 3.0;
     let mut bodies = vec![ground(20.0, 0.6)];
@@ -126,7 +127,7 @@ fn plank(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 0.0, load_tolerance(1.0, world.settings.dt.into()) / G))
 }
 
-/// Upward impulse on a body in the last step (N·s) and its moment about the body's center (N·m·s).
+/// Upward impulse on a body in the last step (N·s), and its moment about the body's center (N·m·s).
 fn bearing(world: &World, body: u32) -> [f64; 2] {
     let mut sum = [0.0; 2];
     for c in world.contacts.iter().filter(|c| c.body_a == body || c.body_b == body) {
@@ -142,8 +143,8 @@ fn bearing(world: &World, body: u32) -> [f64; 2] {
     sum
 }
 
-/// B9. Three discs, the topmost 100 times as dense, is taken away after two seconds: the greatest
-/// upward speed and the greatest gap after that.
+/// B9. The top one of three discs, 100 times as dense, is removed after two seconds. Returns the greatest
+/// upward speed (m/s) and the greatest gap (m) after that.
 fn released(lab: &Lab) -> Result<[f64; 2], Failure> {
     let disc = |y: f64, density: f64| SceneBody::dynamic([0.0, y], SceneShape::disc(0.5).density(density));
     let bodies = vec![ground(20.0, 0.6), disc(0.5, 1.0), disc(1.5, 1.0), disc(2.5, 100.0)];
@@ -171,9 +172,9 @@ fn release_gap(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(released(lab)?[1], 0.0, SLOP))
 }
 
-/// B21. Boxes on an incline of 0.05 rad with µ = 1.1 tan 0.05, for ten minutes: speed of the fastest
-/// from 5 min on. (At 0.25 rad ten would topple: their center is 5 m up and the base ± ½ m wide, so tan
-/// θ < 1/10.)
+/// B21. Boxes on an incline of 0.05 rad with µ = 1.1 tan 0.05, for ten minutes. Measures the greatest speed
+/// of a box after 5 min. (At 0.25 rad ten boxes would topple: their center is 5 m up and the base ± ½ m wide,
+/// so tan θ < 1/10.)
 fn creep(lab: &Lab, count: u32) -> Result<Finding, Failure> {
     let angle: f64 = 0.05;
     let (sin, cos) = angle.sin_cos();
@@ -193,12 +194,12 @@ fn creep(lab: &Lab, count: u32) -> Result<Finding, Failure> {
     Ok(Finding::new(largest(paths.iter().map(|path| slope(path).abs())), 0.0, 1e-5))
 }
 
-/// B21. Three.
+/// B21. Three boxes.
 fn creep_of_three(lab: &Lab) -> Result<Finding, Failure> {
     creep(lab, 3)
 }
 
-/// B21. Ten.
+/// B21. Ten boxes.
 fn creep_of_ten(lab: &Lab) -> Result<Finding, Failure> {
     creep(lab, 10)
 }
@@ -221,7 +222,7 @@ mod tests {
         let manifold = Manifold { normal: Vec2::Y, count: 2, points: [at(-1.0), at(2.0)] };
         let step_impulse = [[3.0, 1.0], [1.0, 0.0]];
         world.contacts = vec![Contact { body_a: 0, body_b: 1, manifold, step_impulse, ..Default::default() }];
-        // Normals −1·3 + 2·1; the friction 1 along (1, 0) half a meter below: +0.5.
+        // Normals −1·3 + 2·1; the friction impulse 1 along (1, 0) acts half a meter below: +0.5.
         assert_eq!(bearing(&world, 1), [4.0, -0.5]);
         assert_eq!(bearing(&world, 0)[0], -4.0);
     }

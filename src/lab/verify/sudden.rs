@@ -46,8 +46,9 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// B23. Two smooth plates under a column of ten boxes go apart and leave both its corners at the same time, 1.99 s after the
-/// start. Nothing bears anything from then on: all boxes fall at the same speed.
+/// B23. Two frictionless plates under a column of ten boxes move apart and leave both its corners at the same
+/// time, 1.99 s after the start. Nothing supports the column from then on, so all boxes fall at the same
+/// speed.
 fn release(lab: &Lab) -> Result<Finding, Failure> {
     let (speed, wait, count) = (5.0, 1.99, 10);
     let end = speed * wait - 0.5;
@@ -70,7 +71,7 @@ fn release(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(slowest - fastest, 0.0, 0.05))
 }
 
-/// B23. Without restitution it stays where it falls, on what stays standing.
+/// B23. Without restitution, a heavy box stays where it lands, and the pile below it stands.
 fn heavy(lab: &Lab) -> Result<Finding, Failure> {
     let boxed = |x: f64, y: f64| SceneBody::dynamic([x, y], SceneShape::rectangle(0.5, 0.5));
     let (mut fastest, mut dt) = (0.0, 0.0);
@@ -96,7 +97,7 @@ fn heavy(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(fastest, 0.0, G * dt))
 }
 
-/// B23. Boxes side by side are a flat floor: a disc that rolls keeps its speed, whatever it weighs.
+/// B23. Boxes side by side form a flat floor: a rolling disc keeps its speed, whatever its weight.
 fn rolling(lab: &Lab) -> Result<Finding, Failure> {
     let (radius, half, mass, speed, count) = (1.0, 0.25, 100.0, 5.0, 80);
     let mut bodies = vec![ground(200.0, 0.6)];
@@ -114,7 +115,7 @@ fn rolling(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(velocity(&world, last)[0], speed, 0.01 * speed))
 }
 
-/// B23. What falls on something without restitution never goes up.
+/// B23. Bodies that land without restitution never move up.
 fn dropped(lab: &Lab) -> Result<Finding, Failure> {
     let (half, gap) = (0.05, 0.01);
     let mut bodies = vec![ground(20.0, 0.6)];

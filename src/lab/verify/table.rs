@@ -6,7 +6,7 @@ use super::{
 };
 use std::sync::LazyLock;
 
-/// Every case, by family. The rows of a group are in its file.
+/// Every case, sorted by family. The rows of a group are in its own file.
 pub static CASES: LazyLock<Vec<&'static Case>> = LazyLock::new(|| {
     let groups = [
         balance::CASES,
@@ -38,7 +38,7 @@ pub static CASES: LazyLock<Vec<&'static Case>> = LazyLock::new(|| {
     cases
 });
 
-/// The letter and the number before the dot.
+/// The letter and the number before the dot of an id.
 fn family(id: &str) -> (&str, u32) {
     let (family, _) = id.split_once('.').expect("an id is a family and a name");
     let (letter, number) = family.split_at(1);

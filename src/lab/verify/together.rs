@@ -1,4 +1,4 @@
-//! A20: impacts that several contacts share, found at once.
+//! A20: impacts shared by several contacts and detected at once.
 
 use super::Required::Yes;
 use super::lab::*;
@@ -33,19 +33,19 @@ pub(super) static CASES: &[Case] = &[
     ),
 ];
 
-/// m/s
+/// Speed of the projectile (m/s).
 const SPEED: f64 = 4.0;
 
-/// Ways before an impact: from touch to several steps (m).
+/// Initial gaps, from touching to several steps of travel (m).
 const GAPS: &[f64] = &[0.0, 0.01, 0.03, 0.05, 0.2];
 
-/// Runs `scene` without weight until what is `gap` away (m) has been hit at [`SPEED`].
+/// Runs `scene` without gravity until a body at a distance of `gap` (m) has been hit at [`SPEED`].
 fn hit(lab: &Lab, scene: Scene, gap: f64) -> Result<World, Failure> {
     let dt = scene.dt;
     lab.run(scene.weightless(), (3.0 + (gap / SPEED / dt).ceil()) * dt, |_| ())
 }
 
-/// The greatest difference of a velocity from its truth (m/s).
+/// The greatest deviation of a velocity from its reference value (m/s).
 fn farthest(world: &World, truth: &[(usize, [f64; 2])]) -> f64 {
     let of = |&(i, [x, y]): &(usize, [f64; 2])| {
         let [vx, vy] = velocity(world, i);
@@ -54,8 +54,9 @@ fn farthest(world: &World, truth: &[(usize, [f64; 2])]) -> f64 {
     largest(truth.iter().flat_map(of))
 }
 
-/// A20. Both normals are at 30° to the way, n = (c, ±½) with c² = ¾, and all discs weigh 1: what comes has v − 2 J c then, the
-/// others J n, and J (1 + 2 c²) = (1 + e) v c. The two part, so that they do not push each other.
+/// A20. Both normals are at 30° to the direction of travel, n = (c, ±½) with c² = ¾, and all discs have
+/// mass 1. The incoming disc leaves at v − 2 J c, the others at J n, with J (1 + 2 c²) = (1 + e) v c. The two
+/// others separate, so they do not push each other.
 fn pair(lab: &Lab) -> Result<Finding, Failure> {
     let (mut worst, c) = (0.0, 0.75f64.sqrt());
     for (e, &gap) in [1.0, 0.5, 0.0].into_iter().flat_map(|e| GAPS.iter().map(move |gap| (e, gap))) {
@@ -72,7 +73,7 @@ fn pair(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 0.0, 1e-3 * SPEED))
 }
 
-/// A20. The wedge of mass M and slope α can but glide: J (1/m + sin²α/M) = v cos α.
+/// A20. A wedge of mass M and slope α can only glide: J (1/m + sin²α/M) = v cos α.
 fn wedge(lab: &Lab) -> Result<Finding, Failure> {
     let (slope, radius, half) = (0.5f64, 0.25, 2.0);
     let (sin, cos) = slope.sin_cos();
@@ -94,8 +95,9 @@ fn wedge(lab: &Lab) -> Result<Finding, Failure> {
     Ok(Finding::new(worst, 0.0, 1e-3 * SPEED))
 }
 
-/// A20. The curb stops the box at its upper edge, a below the box's center, and the ground its front edge, b before it: both
-/// impulses go through the curb's edge, about which angular momentum stays.
+/// A20. The curb's upper edge stops the box at a height a below its center. The ground stops the box's front
+/// edge, b ahead of its center. Both impulses pass through the curb's edge, about which angular momentum is
+/// conserved.
 fn kerb(lab: &Lab) -> Result<Finding, Failure> {
     let (b, half, height) = (0.5, 1.0, 0.3);
     let (a, squared) = (half - height, (b * b + half * half) / 3.0);

@@ -1,8 +1,8 @@
 //! Joints: constraints that are stated as rows, once for all solvers.
 //!
-//! A type of joint implements [`JointType`]: which numbers a joint has at the start of a step, and its [`rows`]. From that
-//! [`Joints`] makes a [`ConstraintType`], which joins the colors and passes of every solver: warm starts, velocity
-//! sweeps in any order, Jacobi sweeps, split masses, position sweeps.
+//! A type of joint implements [`JointType`]: its numbers at the start of a step, and its [`rows`]. [`Joints`]
+//! makes it a [`ConstraintType`], which takes part in the colors and passes of every solver: warm starts,
+//! velocity sweeps in any order, Jacobi sweeps, split masses, position sweeps.
 
 pub mod chains;
 pub mod rows;
@@ -25,41 +25,41 @@ use std::f32::consts::TAU;
 use std::fmt;
 use std::ops::DerefMut;
 
-/// A type of joint between two bodies. `tests/engine/joints.rs` has one from outside.
+/// A type of joint between two bodies. `tests/engine/joints.rs` defines one outside the crate.
 pub trait JointType: Clone + fmt::Debug + Send + 'static {
-    /// Which rows there are; joints of one form are solved together.
+    /// Which rows a joint has. Joints of one form are solved together.
     type Form: Copy + fmt::Debug + Send;
 
     /// Anchors in the frames of a and b (m).
     fn anchors(&self) -> [[f64; 2]; 2];
 
-    /// Numbers of a joint, besides its [`ANCHORS`], that do not change in a step.
+    /// How many numbers a joint has, besides its [`ANCHORS`], that do not change in a step.
     fn numbers(form: Self::Form) -> usize;
 
-    /// Numbers that rows change: impulses (N·s or N·m·s), and errors of springs behind theirs.
+    /// How many numbers its rows change: impulses (N·s or N·m·s), and errors of springs after their impulses.
     fn kept(form: Self::Form) -> usize;
 
     /// Sets the numbers for the coming step.
     fn place(&self, form: Self::Form, at: Placing<'_>, numbers: &mut [f32]);
 
-    /// States the rows from its numbers.
+    /// States the rows of a joint, given its numbers.
     fn rows<L: Lanes>(form: Self::Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>);
 }
 
-/// Numbers that every record begins with: `[r_a, r_b, way]` (m), arms from the centers of mass to the anchors, and the way
-/// from a's anchor to b's, at the start of the step.
+/// How many numbers every record begins with. They are `[r_a, r_b, way]` (m) at the start of the step: the
+/// arms from the centers of mass to the anchors, and the vector from a's anchor to b's.
 pub const ANCHORS: usize = 6;
 
-/// Where the two bodies of a joint are at the start of a step.
+/// The two bodies of a joint at the start of a step.
 #[derive(Debug)]
 pub struct Placing<'a> {
     /// All bodies.
     pub bodies: &'a Bodies,
-    /// a and b.
+    /// Bodies a and b.
     pub ends: [usize; 2],
     /// Substep (s).
     pub h: f32,
-    /// Angle of the step before (rad): angles go on beyond π.
+    /// Angle in the step before (rad), so that angles continue beyond π.
     pub angle: &'a mut f32,
 }
 
@@ -69,7 +69,7 @@ impl Placing<'_> {
         self.bodies.pose(self.ends[0]).rotation.rotate(local)
     }
 
-    /// Angle of b against a from `reference` (rad), counted on from the last one.
+    /// Angle of b relative to a, measured from `reference` (rad). Continues from the last one, beyond π.
     pub fn angle(&mut self, reference: f64) -> f32 {
         let [a, b] = self.ends.map(|i| self.bodies.pose(i).rotation);
         let angle = a.perp_dot(b).atan2(a.dot(b)) - reference as f32;
@@ -85,9 +85,9 @@ pub struct Joints<T: JointType> {
     /// The joints.
     pub joints: Vec<T>,
     form: T::Form,
-    /// Bodies a and b are b and a of the batches, whose b is dynamic.
+    /// Whether bodies a and b are b and a of the batches, in which b is dynamic.
     swapped: bool,
-    /// Of the batches.
+    /// Bodies in the order of the batches. `[joints]`
     ends: Vec<[u32; 2]>,
     /// `[a_x, a_y, b_x, b_y]` from the centers of mass, in the bodies' frames (m). `[joints]`
     anchors: Vec<Quad>,
@@ -95,23 +95,24 @@ pub struct Joints<T: JointType> {
     numbers: Vec<f32>,
     /// `[joints × kept]`
     kept: Vec<f32>,
-    /// `[joints]`
+    /// Angles (rad); see [`Placing::angle`]. `[joints]`
     angles: Vec<f32>,
-    /// Of the step; empty unless asked for. `[joints]`
+    /// Impulses of the step; empty unless they are recorded. `[joints]`
     booked: Vec<Booked>,
-    /// Sums of `kept` over the substeps of the step; empty unless asked for. `[joints × kept]`
+    /// Sums of `kept` over the substeps of the step; empty unless they are recorded. `[joints × kept]`
     summed: Vec<f32>,
-    /// Substep that the impulses belong to (s).
+    /// Substep to which the impulses belong (s).
     h: f32,
     /// Links of chains, whose rigid rows sweeps leave alone.
     linked: Linked,
-    /// Where the impulses of the rigid block are among the kept numbers, and how many; none unless there is one block.
+    /// First kept number of the rigid block, and its number of rows. `None` unless there is exactly one rigid
+    /// block.
     rigid: Option<[usize; 2]>,
 }
 
 impl<T: JointType> Joints<T> {
-    /// None yet. `swapped`: it is b that does not move by impulses. `h`: substep that impulses of the joints that come belong
-    /// to (s).
+    /// No joints yet. `swapped`: b is the body that impulses do not move. `h`: substep to which the impulses
+    /// of added joints belong (s).
     pub fn new(form: T::Form, swapped: bool, h: f32) -> Self {
         let (joints, ends, anchors, numbers, kept, angles) = (vec![], vec![], vec![], vec![], vec![], vec![]);
         let (booked, summed, rigid) = (vec![], vec![], Self::rigid_block(form));
@@ -133,7 +134,7 @@ impl<T: JointType> Joints<T> {
         }
     }
 
-    /// Where the rigid block is: kept numbers that are their own places tell.
+    /// Finds the rigid block. Each kept number is its own index, so the first one of the block is its place.
     fn rigid_block(form: T::Form) -> Option<[usize; 2]> {
         let numbers = vec![0.0; T::numbers(form)];
         let mut kept: Vec<f32> = (0..T::kept(form)).map(|i| i as f32).collect();
@@ -143,7 +144,7 @@ impl<T: JointType> Joints<T> {
         (found.blocks == 1).then_some([found.first as usize, found.rows])
     }
 
-    /// Adds a joint between bodies a and b, of which `kept` and `angle` are what they were.
+    /// Adds a joint between bodies a and b, with its former `kept` numbers and `angle`.
     pub fn push(&mut self, joint: T, bodies: &Bodies, [a, b]: [u32; 2], kept: &[f32], angle: f32) {
         let [from_a, from_b] = joint.anchors();
         let arm = |body: u32, [x, y]: [f64; 2]| {
@@ -162,7 +163,7 @@ impl<T: JointType> Joints<T> {
         self.angles.push(angle);
     }
 
-    /// Lane vectors of a record before those that change.
+    /// Lane vectors of a record before its kept numbers.
     fn first_kept(&self) -> usize {
         ANCHORS + T::numbers(self.form)
     }
@@ -188,7 +189,7 @@ impl<T: JointType> Joints<T> {
                 ));
                 let floats: &mut [f32] = bytemuck::cast_slice_mut(record);
                 if filled < L::WIDTH {
-                    // What the inert row has none of stays zero.
+                    // Padding lanes are zero.
                     floats.chunks_exact_mut(L::WIDTH).for_each(|lanes| lanes[filled..].fill(0.0));
                     floats[ANCHORS * L::WIDTH..].fill(0.0);
                 }
@@ -204,7 +205,7 @@ impl<T: JointType> Joints<T> {
         }
     }
 
-    /// Writes back what records keep; not the impulses of links, which they give themselves.
+    /// Writes the kept numbers of records back, except the impulses of links, which `keep_links` sets.
     fn store<L: Lanes>(&mut self, on: TypeInput<'_>) {
         let (numbers, kept) = (self.first_kept(), T::kept(self.form));
         let stride = self.stride();
@@ -238,7 +239,8 @@ impl<T: JointType> Joints<T> {
         }
     }
 
-    /// Adds λ, and Jᵀ λ of each joint, which is what a warm start gives to bodies of unit mass and inertia at rest.
+    /// Adds up λ, and Jᵀ λ of each joint: the velocities that a warm start gives to resting bodies of unit
+    /// mass and inertia.
     fn book<L: Lanes>(&mut self, on: TypeInput<'_>) {
         let (first_kept, stride) = (self.first_kept(), self.stride());
         for i in 0..on.batches.visits().len() {
@@ -281,7 +283,7 @@ impl<T: JointType> Joints<T> {
         }
     }
 
-    /// A pass between impulses and vectors.
+    /// A pass that transfers between impulses and vectors.
     fn vector_pass<L: Lanes>(&self, of: VectorTask, mut on: TypeInput<'_>) {
         let (first_kept, stride, kept) = (self.first_kept(), self.stride(), T::kept(self.form));
         let (law, inv_h, pushes) = (on.law, 1.0 / on.h, matches!(of, VectorTask::Push));
@@ -298,7 +300,7 @@ impl<T: JointType> Joints<T> {
                 let bodies = [on.rows.gather::<L>(row_a), on.rows.gather::<L>(row_b)];
                 let (numbers, impulses) = record.split_at_mut(first_kept);
                 let (anchors, numbers) = numbers.split_at(ANCHORS);
-                // Blocks of a row are two, the second of which is zero.
+                // A row has two blocks, the second of which is zero.
                 let per_block = 16 / L::WIDTH;
                 let first = 2 * kept * (slot / 16) * per_block + slot % 16 / L::WIDTH;
                 let places = Places { first, stride: 2 * per_block, next: 0 };
@@ -322,7 +324,8 @@ impl<T: JointType> Joints<T> {
         self.velocity_pass::<L, _>(on, |pair| Velocities { pair, by });
     }
 
-    /// A pass over velocities, without the rigid rows of links. These are not counted, so it has no instance that counts.
+    /// A velocity pass that skips the rigid rows of links. Passes with links are not counted, so the counting
+    /// instance does not handle them.
     fn velocity_pass<L: Lanes, P: JointPass<L> + DerefMut>(
         &self,
         on: TypeInput<'_>,
@@ -378,7 +381,7 @@ impl<T: JointType> Joints<T> {
 }
 
 impl<T: JointType> Joints<T> {
-    /// The two bodies of one joint, in one lane, and their names.
+    /// The two bodies of one joint, in one lane, and their indices.
     #[inline]
     fn pair(&self, joint: usize, Placed { rows, poses }: Placed<'_>) -> (JointPair<f32>, [u32; 2]) {
         let [a, b] = self.ends[joint];
@@ -390,7 +393,8 @@ impl<T: JointType> Joints<T> {
         (JointPair::new(bodies, &anchors), names)
     }
 
-    /// States the rows of one joint, in one lane, to a pass over `blocks`; `booked`: with the impulses of the step.
+    /// States the rows of one joint, in one lane, to a pass over `blocks`. `booked`: with the impulses of the
+    /// whole step.
     fn state(&mut self, joint: usize, on: Placed<'_>, blocks: Blocks<'_>, booked: bool) {
         let (pair, names) = self.pair(joint, on);
         let (numbers, kept) = (T::numbers(self.form), T::kept(self.form));
@@ -400,7 +404,7 @@ impl<T: JointType> Joints<T> {
     }
 }
 
-/// Writes back the velocities of bodies a and b where they are pushed.
+/// Writes back the velocities of bodies a and b, if impulses push them.
 #[inline(always)]
 fn write_velocities<L: Lanes>(
     rows: &mut TypeRows<'_>,
@@ -416,7 +420,7 @@ fn write_velocities<L: Lanes>(
     }
 }
 
-/// The numbers that every record begins with, [`ANCHORS`], of joints between these bodies.
+/// The first numbers of every record, [`ANCHORS`], for joints between these bodies.
 #[inline(always)]
 fn placed_anchors<L: Lanes>(
     anchors: &[Quad],
@@ -464,7 +468,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
         self.booked.clear();
         self.summed.clear();
         if self.h != h {
-            // The forces stay the same.
+            // Scales the impulses, so that the forces stay the same.
             let factor = if self.h > 0.0 { h / self.h } else { 1.0 };
             self.kept.iter_mut().for_each(|impulse| *impulse *= factor);
             self.h = h;
@@ -483,7 +487,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
 
     fn run(&mut self, on: TypeInput<'_>) {
         let width = on.width.width;
-        // What sweeps do besides links is not counted.
+        // Sweeps are not counted if there are links.
         let swept = PassWidth { counted: on.width.counted && !self.linked.is_active(), ..on.width };
         let inv_h = 1.0 / on.h;
         match (on.phase, on.mode) {

@@ -1,4 +1,4 @@
-//! Rows of joints: what a joint states once, and what each pass does with it.
+//! Rows of joints: how a joint states them, and what each pass does with them.
 //!
 //! # Row
 //!
@@ -8,12 +8,12 @@
 //! Ċ = J v = d·(v_b − v_a) + s_b ω_b − s_a ω_a
 //! ```
 //!
-//! with an axis d and arms s: r × d at the anchors of a linear row, d = 0 and s = 1 of an angular one. An impulse λ
-//! changes v_b by m_b⁻¹ d λ, ω_b by I_b⁻¹ s_b λ, and body a the other way round.
+//! with an axis d and arms s. A linear row has s = r × d at the anchors; an angular one has d = 0 and s = 1.
+//! An impulse λ changes v_b by m_b⁻¹ d λ, ω_b by I_b⁻¹ s_b λ, and body a in the opposite direction.
 //!
 //! # Block
 //!
-//! N rows are solved together. With K = J M⁻¹ Jᵀ (N × N) every law is a line in the velocity,
+//! N rows are solved together. With K = J M⁻¹ Jᵀ (N × N), every law is a line in the velocity,
 //!
 //! ```text
 //! λ ← α λ − K⁻¹ (p C + q (J v − u))      within its bounds
@@ -27,20 +27,25 @@
 //!
 //! # Spring
 //!
-//! A spring of angular frequency ω and damping ratio ζ gives λ = −K⁻¹ (S x + D v⁺) at the velocity v⁺ after it. With
-//! K λ = v⁺ − v that is the line above, and one substep of h is
+//! A spring of angular frequency ω and damping ratio ζ has the impulse λ = −K⁻¹ (S x + D v⁺), where v⁺ is the
+//! velocity after it. With K λ = v⁺ − v this is the line above, and one substep of h is
 //!
 //! ```text
 //! v⁺ = A (v − S x),   x⁺ = x + h v⁺,   A = 1/(1 + D):    z² − (1 + A − h S A) z + A = 0
 //! ```
 //!
-//! S = ω² h makes the deflection under a load exact. The roots of the true motion are z = e^(−ζωh ± iω_d h), so
-//! A = e^(−2ζωh) makes the decay exact, whatever ω h; the frequency is then off by ζωh/2 of it. From ζ = 1 on both roots are
-//! real, and A is such that the slow one is exact, z = e^(−sωh), s = ζ − √(ζ² − 1): A (1 − z + (ωh)² z) = z (1 − z). Both
-//! roots meet at A = (1 + ωh)⁻², D = ωh (2 + ωh), which is taken about ζ = 1: there the decay is ln(1 + ωh)/h instead of ω. Where
-//! ω h is above 1/2, D grows by (ωh)² − 1/4, which damps what the substep does not resolve: like implicit Euler, stable at any ω.
+//! S = ω² h makes the deflection under a load exact. The roots of the exact motion are z = e^(−ζωh ± iω_d h),
+//! so A = e^(−2ζωh) makes the decay exact for any ω h. The frequency then has a relative error of ζωh/2.
 //!
-//! The error x is that at the beginning of the substep, also in relaxing sweeps, which come after bodies have moved.
+//! For ζ ≥ 1, both roots are real, and A makes the slow one exact, z = e^(−sωh), s = ζ − √(ζ² − 1): A (1 − z
+//! + (ωh)² z) = z (1 − z). Both roots meet at A = (1 + ωh)⁻², D = ωh (2 + ωh), which is used around ζ = 1:
+//! there the decay rate is ln(1 + ωh)/h instead of ω.
+//!
+//! For ω h above 1/2, D grows by (ωh)² − 1/4, which damps the motion that the substep does not resolve. The
+//! result is stable at any ω, like implicit Euler.
+//!
+//! The error x is that at the beginning of the substep. Relaxing sweeps use it as well, although bodies have
+//! moved since.
 
 use crate::engine::constraints::joints::ANCHORS;
 use crate::engine::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, turn};
@@ -74,20 +79,20 @@ pub fn spring_coefficients(hertz: f32, damping_ratio: f32, h: f32) -> [f32; 2] {
     [y * y / h, (damping + unresolved).min(1e9)]
 }
 
-/// What a joint type states its rows to, [`JointType::rows`](super::JointType::rows): one pass over its joints.
+/// A pass over the joints of a type. [`JointType::rows`](super::JointType::rows) states their rows to it.
 pub trait JointPass<L: Lanes>: Deref<Target = JointPair<L>> {
-    /// One block: N rows with their errors (m or rad), their law and their accumulated impulses (N·s or N·m·s), behind which
-    /// are N numbers more.
+    /// One block: N rows with their errors (m or rad), their law and their accumulated impulses (N·s or
+    /// N·m·s), followed by N more numbers.
     fn block<const N: usize>(&mut self, j: [Jacobian<L>; N], error: [L; N], law: RowLaw<L>, kept: &mut [L]);
 
-    /// One row of a rigid or limited error, a motor or a spring; see [`Self::block`].
+    /// One row: rigid, a limit, a motor or a spring; see [`Self::block`].
     #[inline(always)]
     fn row(&mut self, j: Jacobian<L>, error: L, law: RowLaw<L>, kept: &mut [L]) {
         self.block([j], [error], law, kept);
     }
 }
 
-/// Passes are the pair that they work on.
+/// Makes passes dereference to the pair of bodies that they work on.
 macro_rules! is_pair {
     ($($pass:ident<$($generic:tt),*>)*) => {$(
         impl<$($generic),*> Deref for $pass<$($generic),*> {
@@ -130,10 +135,10 @@ impl Deref for Collected<'_> {
     }
 }
 
-/// The two bodies of a batch of joints, and where they are joined.
+/// The two bodies of a batch of joints, and their anchors.
 #[derive(Clone, Copy, Debug)]
 pub struct JointPair<L> {
-    /// Rows of a and b.
+    /// Rows of bodies a and b.
     pub(crate) bodies: [[L; 8]; 2],
     /// sin Δθ and 1 − cos Δθ of a and b.
     turns: [(L, L); 2],
@@ -160,7 +165,8 @@ impl<L: Lanes> JointPair<L> {
         JointPair { bodies, turns: [turn(bodies[0][TURN]), turn(bodies[1][TURN])], anchors }
     }
 
-    /// `vector`, fixed to body `side` (0 for a) at the start of the step, as it is now.
+    /// The present direction of `vector`, which is fixed to body `side` (0 for a) and given at the start of
+    /// the step.
     #[inline(always)]
     pub fn turned(&self, side: usize, vector: [L; 2]) -> [L; 2] {
         add(vector, self.turn_of(side, vector))
@@ -173,20 +179,20 @@ impl<L: Lanes> JointPair<L> {
         [-(sine.mul_add(r[1], versine * r[0])), versine.neg_mul_add(r[1], sine * r[0])]
     }
 
-    /// How far b has turned more than a since the start of the step (rad).
+    /// Turn of b relative to a since the start of the step (rad).
     #[inline(always)]
     pub fn turn(&self) -> L {
         self.bodies[1][TURN] - self.bodies[0][TURN]
     }
 
-    /// J times the displacements since the start of the step (m or rad): the error of a row that holds a speed alone, and
-    /// knows of no error before.
+    /// J times the displacements since the start of the step (m or rad). This is the error of a row that only
+    /// holds a speed and has no error at the start of the step.
     #[inline(always)]
     pub fn travel(&self, j: &Jacobian<L>) -> L {
         self.rate(j, [DX, DY, TURN])
     }
 
-    /// Arms of a and b to their anchors (m), and the way from a's anchor to b's (m), as they are now.
+    /// Present arms of a and b to their anchors (m), and present vector from a's anchor to b's (m).
     #[inline(always)]
     pub fn anchors(&self) -> ([[L; 2]; 2], [L; 2]) {
         let record = &self.anchors;
@@ -200,7 +206,7 @@ impl<L: Lanes> JointPair<L> {
         ([add(start[0], moved[0]), add(start[1], moved[1])], way)
     }
 
-    /// J x of rows of which `at` is the place of the first number: velocities, or displacements.
+    /// J x, where x are the velocities or the displacements at these places of the body rows.
     #[inline(always)]
     fn rate(&self, j: &Jacobian<L>, [x, y, w]: [usize; 3]) -> L {
         let [a, b] = &self.bodies;
@@ -255,7 +261,7 @@ const VELOCITY: [usize; 3] = [VX, VY, W];
 #[derive(Debug)]
 pub(super) struct JointWarmStart<L> {
     pub pair: JointPair<L>,
-    /// Springs and motors alone.
+    /// Whether only springs and motors are applied.
     pub driving: bool,
 }
 
@@ -278,11 +284,11 @@ pub(super) struct Velocities<L> {
     pub by: VelocityRule,
 }
 
-/// A pass over velocities, without the rigid rows of some joints.
+/// A velocity pass that leaves out the rigid rows of some joints.
 #[derive(Debug)]
 pub(super) struct Besides<L, P> {
     pub of: P,
-    /// 1 where rigid rows take part, 0 where they are left alone.
+    /// 1 where rigid rows take part, 0 where they stay unchanged.
     pub taken: L,
 }
 
@@ -309,9 +315,9 @@ impl<L: Lanes, P: JointPass<L> + DerefMut> JointPass<L> for Besides<L, P> {
 /// How velocities are solved.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct VelocityRule {
-    /// Of rigid rows.
+    /// Softness of rigid rows.
     pub law: Softness,
-    /// Whether bodies have moved since springs were read.
+    /// Whether bodies have moved since the errors of springs were read.
     pub relaxing: bool,
     /// Whether rigid rows and limits act, and whether springs and motors do.
     pub acts: [bool; 2],
@@ -388,7 +394,7 @@ impl<L: Lanes> JointPass<L> for Velocities<L> {
     }
 }
 
-/// Moves bodies alone.
+/// Only moves bodies.
 #[derive(Debug)]
 pub(super) struct Displacements<L> {
     pub pair: JointPair<L>,
@@ -398,16 +404,16 @@ pub(super) struct Displacements<L> {
 /// How bodies are moved.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum DisplacementRule {
-    /// By velocities that only move bodies; accumulates nothing.
+    /// By velocities that only move bodies; no impulses are accumulated.
     Push {
-        /// Of rigid rows.
+        /// Softness of rigid rows.
         law: Softness,
     },
-    /// Until errors are gone.
+    /// By displacements that remove the errors.
     Position {
         /// Largest correction of a length (m), and of an angle (rad).
         max_correction: [f32; 2],
-        /// 1/h, where displacements are impulses (1/s); else 0.
+        /// 1/h if displacements count as impulses (1/s), otherwise 0.
         inv_h: f32,
     },
 }
@@ -462,9 +468,9 @@ impl<L: Lanes> JointPass<L> for Displacements<L> {
 #[derive(Debug)]
 pub(super) struct Vectors<'v, L> {
     pub pair: JointPair<L>,
-    /// What it does.
+    /// The task.
     pub of: VectorTask,
-    /// Of rigid rows.
+    /// Softness of rigid rows.
     pub law: Softness,
     /// 1/h (1/s)
     pub inv_h: f32,
@@ -476,17 +482,18 @@ pub(super) struct Vectors<'v, L> {
 /// Where the rows of a batch are in vectors, in lane vectors.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Places {
-    /// Of its first row.
+    /// Index of the first row.
     pub first: usize,
-    /// From row to row.
+    /// Distance from row to row.
     pub stride: usize,
-    /// Rows that have been visited.
+    /// Number of rows visited.
     pub next: usize,
 }
 
 impl<L: Lanes> JointPass<L> for Vectors<'_, L> {
-    /// A row asks for J v + b + R λ = 0 within its bounds: b = β C where it is rigid, C/h where a limit is open, −u of a
-    /// motor, and b = (S/D) C, R = K/D of a spring, which is the line of the [module](self) at rest.
+    /// Each row requires J v + b + R λ = 0 within its bounds: b = β C for a rigid row, C/h for an open limit,
+    /// −u for a motor. For a spring, b = (S/D) C and R = K/D, which is the line of the [module](self) for a
+    /// constant λ.
     #[inline(never)]
     fn block<const N: usize>(
         &mut self,
@@ -578,7 +585,8 @@ impl<L: Lanes> JointPass<L> for Vectors<'_, L> {
     }
 }
 
-/// Finds the rigid blocks of a joint: how many there are, and rows and first kept number of the last one.
+/// Counts the rigid blocks of a joint, and finds the number of rows and the first kept number of the last
+/// one.
 #[derive(Debug)]
 pub(super) struct RigidFinder {
     pub pair: JointPair<f32>,
@@ -601,21 +609,21 @@ impl JointPass<f32> for RigidFinder {
     }
 }
 
-/// Copies the blocks of one joint, or takes their impulses back.
+/// Copies the blocks of one joint, or writes their impulses back to it.
 #[derive(Debug)]
 pub(super) struct Collected<'v> {
     pub pair: JointPair<f32>,
-    /// The two bodies.
+    /// Bodies a and b.
     pub names: [u32; 2],
     pub blocks: Blocks<'v>,
 }
 
-/// Which way blocks go.
+/// Direction in which blocks are copied.
 #[derive(Debug)]
 pub(super) enum Blocks<'v> {
-    /// Appended.
+    /// Appends the blocks.
     To(&'v mut Vec<RowBlock>),
-    /// One after the other.
+    /// Takes the impulses of these blocks, one after the other.
     From(std::slice::Iter<'v, RowBlock>),
 }
 
@@ -680,7 +688,7 @@ mod tests {
             let (s, d) = (f64::from(s), f64::from(d));
             let a = 1.0 / (1.0 + d);
             let trace = 1.0 + a - h * s * a;
-            // Size of the slowest root of z² − trace z + a.
+            // Magnitude of the slowest root of z² − trace z + a.
             let root = trace * trace / 4.0 - a;
             let size = if root > 0.0 { trace / 2.0 + root.sqrt() } else { a.sqrt() };
             let slow = if zeta < 1.0 { zeta } else { zeta - (zeta * zeta - 1.0).sqrt() };
@@ -693,7 +701,7 @@ mod tests {
             // At rest S x = h g.
             assert!((s - omega * omega * h).abs() < 1e-5 * s, "{zeta} {y}");
         }
-        // What a substep does not resolve is stable.
+        // Frequencies that a substep does not resolve are stable.
         for y in [0.6f32, 1.0, 3.0, 100.0] {
             let [s, d] = spring_coefficients(y / TAU, 0.0, 1.0);
             let a = 1.0 / (1.0 + d);

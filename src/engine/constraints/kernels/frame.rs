@@ -10,34 +10,34 @@
 //! u·(v_b + ω_b × r_b − v_a − ω_a × r_a) = u·(v_b − v_a) + ω_b (r_b × u) − ω_a (r_a × u)
 //! ```
 //!
-//! because u·(ω × r) = ω (r × u) in the plane. So a row needs no arm, only the scalar
-//! r × u. All rows of one contact share n and t; a sweep therefore gathers the bodies
-//! once and turns v_b − v_a into the contact frame (two numbers, `along_n` and `along_t`);
-//! from those and ω_a, ω_b every row has its velocity. An impulse λ along n changes
+//! because u·(ω × r) = ω (r × u) in the plane. A row therefore stores no arm vector, only the scalar r × u.
+//! All rows of one contact share n and t, so a sweep gathers the bodies once and rotates v_b − v_a into the
+//! contact frame (two numbers, `along_n` and `along_t`). These and ω_a, ω_b give the velocity of every row.
+//! An impulse λ along n changes
 //!
 //! ```text
 //! along_n += (m_a⁻¹ + m_b⁻¹) λ,   ω_b += I_b⁻¹ (r_b × n) λ,   ω_a −= I_a⁻¹ (r_a × n) λ
 //! ```
 //!
-//! and leaves `along_t` alone, since n ⊥ t; likewise along t. The sums of the impulses
-//! are turned back and applied to the bodies once.
+//! and leaves `along_t` unchanged, since n ⊥ t; likewise along t. The sums of the impulses are rotated back
+//! and applied to the bodies once.
 //!
 //! # Separation
 //!
-//! With the bodies moved by Δx and turned by Δθ since the step began, an anchor r
-//! becomes R(Δθ) r, and n·(R(Δθ) r − r) = sin Δθ (r × n) − (1 − cos Δθ)(n·r). Since
-//! r × t = −(r·n), the rotated separation needs the two arms and nothing else:
+//! With the bodies moved by Δx and turned by Δθ since the step began, an anchor r becomes R(Δθ) r, and
+//! n·(R(Δθ) r − r) = sin Δθ (r × n) − (1 − cos Δθ)(n·r). Since r × t = −(r·n), the rotated separation needs
+//! only the two arms:
 //!
 //! ```text
 //! s = s₀ + n·(Δx_b − Δx_a) + σ_b (r_b × n) + κ_b (r_b × t) − σ_a (r_a × n) − κ_a (r_a × t)
 //! ```
 //!
-//! with σ = sin Δθ and κ = 1 − cos Δθ, both from their Taylor series.
+//! with σ = sin Δθ and κ = 1 − cos Δθ, both approximated by their Taylor series.
 //!
 //! # Effective mass
 //!
-//! The velocity along u answers to a unit impulse along u with
-//! k = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (r_a × u)² + I_b⁻¹ (r_b × u)²; the effective mass is 1/k.
+//! A unit impulse along u changes the velocity along u by k = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (r_a × u)² + I_b⁻¹ (r_b ×
+//! u)²; the effective mass is 1/k.
 
 use crate::engine::constraints::records::features::{KernelFeatures, Layout, Opposite};
 use crate::engine::lanes::{LaneIndex, Lanes, RowStore};
@@ -68,7 +68,7 @@ impl<L: Lanes> BodyPair<L> {
         BodyPair { a, b: rows.gather(row_b) }
     }
 
-    /// As [`Self::gather`], of bodies that have not just been written, see [`Lanes::gather_whole`].
+    /// As [`Self::gather`], for rows that were not written just before, see [`Lanes::gather_whole`].
     #[inline(always)]
     pub(crate) fn gather_whole<O: Opposite, S: RowStore + ?Sized>(
         rows: &S,
@@ -79,7 +79,7 @@ impl<L: Lanes> BodyPair<L> {
         BodyPair { a, b: rows.gather_whole(row_b) }
     }
 
-    /// Writes back the velocities of the bodies that answer to impulses.
+    /// Writes back the velocities of body b, and of body a if `pushes_a`.
     #[inline(always)]
     pub(crate) fn scatter_velocities<O: Opposite, S: RowStore + ?Sized>(
         &self,
@@ -104,7 +104,7 @@ pub(crate) fn to_frame<L: Lanes, O: Opposite>(a: [L; 2], b: [L; 2], n: [L; 2]) -
     [n[0].mul_add(x, n[1] * y), n[1].mul_add(x, -(n[0] * y))]
 }
 
-/// `base + ω_b arm_b − ω_a arm_a`, where the needs have arms.
+/// `base + ω_b arm_b − ω_a arm_a`, if the kernel features include rotation.
 #[inline(always)]
 pub(crate) fn with_arms<L: Lanes, N: KernelFeatures, O: Opposite>(base: L, w: [L; 2], arm: [L; 2]) -> L {
     let mut v = base;
@@ -117,7 +117,7 @@ pub(crate) fn with_arms<L: Lanes, N: KernelFeatures, O: Opposite>(base: L, w: [L
     v
 }
 
-/// `ω_b += I_b⁻¹ arm_b λ`, `ω_a −= I_a⁻¹ arm_a λ`, where the needs have arms.
+/// `ω_b += I_b⁻¹ arm_b λ`, `ω_a −= I_a⁻¹ arm_a λ`, if the kernel features include rotation.
 #[inline(always)]
 pub(crate) fn spin<L: Lanes, N: KernelFeatures, O: Opposite>(
     w: &mut [L; 2],
@@ -149,10 +149,10 @@ pub(crate) fn arms<L: Lanes, N: KernelFeatures, O: Opposite>(
     [a, b]
 }
 
-/// sin θ and 1 − cos θ of the turn within one step.
+/// sin θ and 1 − cos θ of the rotation within one step.
 ///
-/// The first two Taylor terms of each: the error is below θ⁵/120 and θ⁶/720, so below
-/// 3e-8 for a turn of 0.05 rad (3 rad/s at 60 Hz) and 2.6e-4 at half a radian.
+/// The first two Taylor terms of each. The errors are below θ⁵/120 and θ⁶/720: below 3e-8 for 0.05 rad
+/// (3 rad/s at 60 Hz) and 2.6e-4 for half a radian.
 #[inline(always)]
 pub(crate) fn turn<L: Lanes>(angle: L) -> (L, L) {
     let square = angle * angle;
@@ -161,8 +161,9 @@ pub(crate) fn turn<L: Lanes>(angle: L) -> (L, L) {
     (sine, versine)
 }
 
-/// Arms r × n and r × t of bodies a and b, turned by Δθ (see [`crate::engine::constraints::kernels::position`]):
-/// R r × n = cos Δθ (r × n) + sin Δθ (r × t), R r × t = cos Δθ (r × t) − sin Δθ (r × n).
+/// Arms r × n and r × t of bodies a and b, turned by Δθ (see
+/// [`crate::engine::constraints::kernels::position`]): R r × n = cos Δθ (r × n) + sin Δθ (r × t), R r × t =
+/// cos Δθ (r × t) − sin Δθ (r × n).
 #[inline(always)]
 pub(crate) fn turned<L: Lanes>(arm_n: [L; 2], arm_t: [L; 2], sine: [L; 2], versine: [L; 2]) -> [[L; 2]; 2] {
     let n = |k: usize| sine[k].mul_add(arm_t[k], versine[k].neg_mul_add(arm_n[k], arm_n[k]));
@@ -170,8 +171,8 @@ pub(crate) fn turned<L: Lanes>(arm_n: [L; 2], arm_t: [L; 2], sine: [L; 2], versi
     [[n(0), n(1)], [t(0), t(1)]]
 }
 
-/// Separation at point `p` (m): see the [module](self). `moved` is n·(Δx_b − Δx_a), `sine` and `versine` are those of
-/// the turns of a and b.
+/// Separation at point `p` (m), see the [module](self). `moved` is n·(Δx_b − Δx_a); `sine` and `versine`
+/// belong to the rotations of a and b.
 #[inline(always)]
 pub(crate) fn separation<L: Lanes, N: KernelFeatures, O: Opposite>(
     record: &[L],
@@ -186,7 +187,7 @@ pub(crate) fn separation<L: Lanes, N: KernelFeatures, O: Opposite>(
     with_arms::<L, N, O>(s, versine, along(1))
 }
 
-/// Turns the impulses along n and t back into world axes and applies them; `w` are the new spins.
+/// Rotates the impulses along n and t back into world axes and applies them; `w` are the new spins.
 #[inline(always)]
 pub(crate) fn apply<L: Lanes, O: Opposite>(
     a: &mut [L; 8],

@@ -1,8 +1,9 @@
 //! Passes over bodies and contacts, compiled per width and features.
 //!
-//! Reading order: [`frame`] (bodies and rows of a contact), [`stages`] (how a kernel goes through batches), [`velocity`]
-//! (sweeps and the [rules](velocity::rules) that they solve) and [`position`], then [`prepare`] and [`motion`]. [`pass`] is
-//! how a kernel is added, [`types`] how constraints of other types take part, and [`observe`] how metrics see a rule.
+//! Reading order: [`frame`] (bodies and rows of a contact), [`stages`] (iteration over batches), [`velocity`]
+//! (sweeps and the [rules](velocity::rules) that they solve) and [`position`], then [`prepare`] and
+//! [`motion`]. [`pass`] defines the interface of a kernel, [`types`] that of other constraint types, and
+//! [`observe`] extracts the contact law of a rule for metrics.
 
 pub mod frame;
 #[doc(hidden)]

@@ -1,14 +1,13 @@
-//! Motion and rotation: from velocities to positions, and from forces to velocities.
+//! Integration: forces to velocities, velocities to positions and rotations.
 //!
-//! Semi-implicit Euler takes v first and then x with the new v:
+//! Semi-implicit Euler updates v first and then x with the new v:
 //!
 //! ```text
 //! vₖ₊₁ = vₖ + h a,   xₖ₊₁ = xₖ + h vₖ₊₁   ⇒   x_n = x₀ + v₀ t + a t²/2 (1 + 1/n)
 //! ```
 //!
-//! explicit Euler takes x with the old v, and so has (1 − 1/n) in the last factor and
-//! gains energy on every orbit. Damping of rate c is taken implicitly, v ← v/(1 + h c),
-//! which is stable for any h.
+//! Explicit Euler updates x with the old v; the last factor is then (1 − 1/n), and every orbit gains energy.
+//! Damping of rate c is integrated implicitly, v ← v/(1 + h c), which is stable for any h.
 
 use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::constraints::records::features::Features;
@@ -23,7 +22,7 @@ pub enum Integrator {
     /// Velocity first, then position with the new velocity.
     #[default]
     SemiImplicitEuler,
-    /// Position with the old velocity. Here to show its error.
+    /// Position with the old velocity. Present only to show its error.
     ExplicitEuler,
 }
 
@@ -31,21 +30,21 @@ pub enum Integrator {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum RotationUpdate {
-    /// By h ω.
+    /// Rotation by h ω.
     #[default]
     Exact,
-    /// By atan(h ω): what q ← normalize(q + h ω q⊥) does, as many engines have it.
+    /// Rotation by atan(h ω), which is the effect of q ← normalize(q + h ω q⊥) in many engines.
     Normalized,
 }
 
 /// Inputs of [`Motion::load`] besides the bodies.
 #[derive(Clone, Copy, Debug)]
 pub struct MotionInput {
-    /// m/s²
+    /// Gravity (m/s²).
     pub gravity: [f32; 2],
     /// Substep (s).
     pub h: f32,
-    /// Features that the scene itself needs.
+    /// Features of the scene itself.
     pub features: Features,
     /// How velocities move bodies.
     pub integrator: Integrator,
@@ -53,16 +52,16 @@ pub struct MotionInput {
     pub rotation: RotationUpdate,
 }
 
-/// Data for moving bodies, one entry per row.
+/// Per-row data of the integration of bodies.
 #[derive(Clone, Debug, Default)]
 pub struct Motion {
     /// Velocity that forces add in one substep: `[h aₓ, h a_y, h α, 0]`.
     velocity_increment: Vec<[f32; 4]>,
-    /// Damping factors `[1/(1+hc), 1/(1+hc), 1/(1+hc_ω), 1]`; empty when nothing is damped.
+    /// Damping factors `[1/(1+hc), 1/(1+hc), 1/(1+hc_ω), 1]`; empty if no body is damped.
     damp: Vec<[f32; 4]>,
     /// Velocity before constraints acted in this substep.
     free: Vec<[f32; 4]>,
-    /// Round bodies, and how far each has turned in this step (rad).
+    /// Round bodies, with the rotation of each in this step (rad).
     round: Vec<(u32, f32)>,
     /// Substep (s).
     h: f32,
@@ -71,7 +70,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Fills the rows (one per body and one inert row at the end) and the kicks.
+    /// Fills the rows (one per body and one inert row at the end) and the velocity increments.
     pub fn load(&mut self, bodies: &Bodies, rows: &mut Vec<BodyRow>, step: &MotionInput) {
         let &MotionInput { gravity, h, features, integrator, rotation } = step;
         let damped = features.damping;
@@ -88,7 +87,7 @@ impl Motion {
                 self.round.push((i as u32, 0.0));
             }
             let inv_mass = bodies.inv_mass[i];
-            // Without rotation, infinite inertia shows that nothing turns a body.
+            // Without rotation, infinite inertia marks that nothing turns the body.
             let inv_inertia = if features.rotation { bodies.inv_inertia[i] } else { 0.0 };
             rows.push(BodyRow {
                 velocity: [bodies.velocity_x[i], bodies.velocity_y[i], bodies.angular_velocity[i], inv_mass],
@@ -120,29 +119,29 @@ impl Motion {
         self.free.resize(count + 1, [0.0; 4]);
     }
 
-    /// Bytes held.
+    /// Allocated bytes.
     pub fn held_bytes(&self) -> usize {
         held(&self.velocity_increment) + held(&self.damp) + held(&self.free) + held(&self.round)
     }
 
-    /// Changes of velocity in free flight per substep: `[h aₓ, h a_y, h α, 0]` per row.
+    /// Velocity increments in free flight per substep: `[h aₓ, h a_y, h α, 0]` per row.
     pub fn velocity_increments(&self) -> &[[f32; 4]] {
         &self.velocity_increment
     }
 
-    /// v ← v/(1 + h c) + h a, for every row.
+    /// v ← v/(1 + h c) + h a, for every row. The explicit integrator first moves bodies with the old
+    /// velocities.
     pub fn integrate_velocities(&mut self, rows: &mut [BodyRow]) {
         self.explicit_positions(rows);
         self.increment_rows(rows, |_, free, _| free);
     }
 
-    /// As [`Self::integrate_velocities`], and adds once more what the constraints added
-    /// to each velocity in the last substep.
+    /// As [`Self::integrate_velocities`], and repeats the velocity change that the constraints made in the
+    /// last substep.
     ///
-    /// That is a warm start without a pass over constraints: while Jacobians are fixed
-    /// over the step, the accumulated impulses λ at the end of a substep have changed
-    /// the velocity by M⁻¹Jᵀλ = v_end − v_free, and the next substep's warm start is to
-    /// apply the same λ through the same J.
+    /// This is a warm start without a pass over constraints. While Jacobians are fixed over the step, the
+    /// accumulated impulses λ at the end of a substep have changed the velocity by M⁻¹Jᵀλ = v_end − v_free,
+    /// and a warm start of the next substep would apply the same λ through the same J.
     pub fn extrapolate_velocities(&mut self, rows: &mut [BodyRow]) {
         self.explicit_positions(rows);
         self.increment_rows(rows, |v, free, last_free| free + (v - last_free));
@@ -168,7 +167,7 @@ impl Motion {
         }
     }
 
-    /// Time for which bodies move with the velocities of a substep's end (s).
+    /// Time for which bodies move with the velocities at the end of a substep (s).
     pub(crate) fn after_velocities(&self) -> f32 {
         if self.integrator == Integrator::SemiImplicitEuler { self.h } else { 0.0 }
     }
@@ -179,7 +178,7 @@ impl Motion {
         }
     }
 
-    /// Δx ← Δx + h v and Δθ ← Δθ + h ω, for every row.
+    /// Δx ← Δx + h v and Δθ ← Δθ + h ω, for every row, under the semi-implicit integrator; otherwise nothing.
     pub fn integrate_positions(&mut self, rows: &mut [BodyRow]) {
         if self.integrator == Integrator::SemiImplicitEuler {
             self.advance(rows);
@@ -208,18 +207,19 @@ impl Motion {
         self.hide_turns(rows);
     }
 
-    /// Takes the turns of round bodies out of their rows, until [`Self::finish`].
+    /// Moves the rotations of round bodies out of their rows, until [`Self::finish`].
     pub(crate) fn hide_turns(&mut self, rows: &mut [BodyRow]) {
-        // A contact's anchor turns with its body, as a corner does. The contact point of a disc
-        // does not: it stays on the line of centers however the disc rolls. So sweeps are
-        // not shown the turn of a round body; it is kept here for its pose. Without this a disc
-        // that rolls at 7 rad/s and 60 Hz seems to lift off by 3 mm in the course of a step.
+        // A contact's anchor turns with its body, as a corner does. The contact point of a disc does not: it
+        // stays on the line of centers however the disc rolls. So the rotation of a round body is hidden from
+        // the sweeps and kept here for its pose. Otherwise a disc that rolls at 7 rad/s and 60 Hz appears to
+        // lift off by 3 mm in the course of a step.
         for (body, turned) in &mut self.round {
             *turned += std::mem::take(&mut rows[*body as usize].delta[2]);
         }
     }
 
-    /// Writes the turns of round bodies since the step began (rad) to `rows`, as spins; zero for others.
+    /// Writes the rotations of round bodies since the step began (rad) to `rows`, as spins; zero for other
+    /// bodies.
     pub(crate) fn hidden_turns(&self, rows: &mut [BodyRow]) {
         rows.iter_mut().for_each(|row| row.velocity[2] = 0.0);
         for &(body, turned) in &self.round {
@@ -227,7 +227,7 @@ impl Motion {
         }
     }
 
-    /// Puts the turns of round bodies back into their rows, at the end of a step.
+    /// Adds the rotations of round bodies back to their rows, at the end of a step.
     pub fn finish(&self, rows: &mut [BodyRow]) {
         for &(body, turned) in &self.round {
             rows[body as usize].delta[2] += turned;
@@ -237,9 +237,8 @@ impl Motion {
 
 /// Writes velocities back and moves every body by its row's Δx and Δθ.
 ///
-/// (c, s) turns by Δθ as a product of unit complex numbers, in lanes of 8 whatever
-/// width the solver ran at; one Newton step of the inverse square root,
-/// (3 − |q|²)/2, keeps it on the circle.
+/// (c, s) is rotated by Δθ as a product of unit complex numbers, in lanes of 8 at any solver width. One
+/// Newton step of the inverse square root, (3 − |q|²)/2, keeps it normalized.
 pub fn store(bodies: &mut Bodies, rows: &[BodyRow], rotation: bool) {
     for (i, row) in rows[..bodies.kind.len()].iter().enumerate() {
         if bodies.kind[i] == BodyKind::Static {
@@ -270,7 +269,7 @@ pub fn store(bodies: &mut Bodies, rows: &[BodyRow], rotation: bool) {
         let (s, c) = turn.sin_cos();
         let (c, s) = (*cos * c - *sin * s, *sin * c + *cos * s);
         let scale = (f32x8::splat(3.0) - (c * c + s * s)) * f32x8::splat(0.5);
-        // A body that did not turn keeps its bits.
+        // A body that did not turn keeps its rotation to the bit.
         let still = turn.simd_eq(f32x8::splat(0.0));
         *cos = still.select(*cos, c * scale);
         *sin = still.select(*sin, s * scale);

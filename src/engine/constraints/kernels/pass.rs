@@ -1,8 +1,8 @@
-//! A pass over all contacts: what it needs to run, and how it finds its instance.
+//! A pass over all contacts: its inputs, and the choice of its compiled instance.
 //!
-//! A pass is compiled for every lane width and every set of features; the schedule of a solver
-//! is compiled once. [`Pass`] is the generic side, which kernels implement; [`AnyPass`] the side
-//! that schedules see. Which instance runs is decided once per pass, outside of all loops.
+//! A pass is compiled for every lane width and every set of features; the schedule of a solver is compiled
+//! once. Kernels implement the generic [`Pass`]; schedules use [`AnyPass`]. The instance is chosen once per
+//! pass, outside of all loops.
 
 use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::records::batches::{Batches, Part};
@@ -16,42 +16,42 @@ use crate::engine::lanes::{BodyRow, LaneWidth, Lanes};
 pub struct PassInput<'a> {
     /// One row per body, and an inert one at the end.
     pub rows: &'a mut [BodyRow],
-    /// Colored batches, or serial ones.
+    /// Either the colored or the serial batches.
     pub batches: &'a mut Batches,
-    /// Which of both.
+    /// Which of the two `batches` are.
     pub part: Part,
     /// Side records for restitution; empty in scenes without it.
     pub bounces: &'a mut Bounces,
     /// All contacts.
     pub contacts: &'a mut [Contact],
-    /// Numbers that the solver keeps per contact, per contact point and per body.
+    /// Values that the solver keeps per contact, per contact point and per body.
     pub kept: &'a mut Kept,
-    /// Changes of velocity in free flight per substep, `[h aₓ, h a_y, h α, 0]` per row.
+    /// Velocity increments in free flight per substep, `[h aₓ, h a_y, h α, 0]` per row.
     pub increments: &'a [[f32; 4]],
 }
 
-/// Memory requests of a pass per contact.
+/// Memory accesses of a pass per contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PerLane {
-    /// Floats of records that are read.
+    /// Floats read from records.
     pub floats_read: usize,
-    /// Floats of records that are written.
+    /// Floats written to records.
     pub floats_written: usize,
-    /// Rows of bodies that are gathered (32 B each).
+    /// Body rows gathered (32 B each).
     pub rows: usize,
-    /// Halves of rows that are written back (16 B each).
+    /// Half rows written back (16 B each).
     pub halves: usize,
 }
 
 impl PerLane {
-    /// A pass that gathers the bodies of a contact once and writes back a half row of each that moves.
+    /// A pass that gathers the bodies of a contact once and writes back half a row of each body that moves.
     pub fn of_bodies(floats_read: usize, floats_written: usize, opposite: OppositeKind) -> Self {
         let rows = 1 + usize::from(opposite != OppositeKind::Static);
         let halves = 1 + usize::from(opposite == OppositeKind::Dynamic);
         PerLane { floats_read, floats_written, rows, halves }
     }
 
-    /// A velocity sweep: normal and friction; arms, separation, masses and impulses of each point.
+    /// A velocity sweep. Reads normal and friction, and arms, separation, masses and impulses of each point.
     pub fn of_sweep(layout: &Layout, friction: bool, opposite: OppositeKind) -> Self {
         let friction = layout.has_friction && friction;
         let impulses = if friction { 2 } else { 1 };
@@ -60,47 +60,48 @@ impl PerLane {
     }
 }
 
-/// Body access of a pass, for constraint types with their own kernels.
+/// How a pass accesses bodies. Kernels of other constraint types follow it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum PassMode {
-    /// Each constraint sees what those before it have done to its bodies.
+    /// Each constraint sees the effect of the earlier ones on its bodies.
     #[default]
     InTurn,
-    /// Each constraint sees the bodies from before the pass. What all of them add to a body is summed up.
+    /// Each constraint sees the bodies from before the pass. All increments of a body are summed up.
     Jacobi {
         /// Factor on the increments of velocities and impulses (1).
         relaxation: f32,
     },
     /// Inverse masses have changed: only effective masses are recomputed.
     Masses,
-    /// Bodies are moved until errors are gone.
+    /// Bodies are moved to remove position errors.
     Position {
         /// Largest correction of a length (m), and of an angle (rad).
         max_correction: [f32; 2],
-        /// Whether displacements count as impulses of h.
+        /// Whether displacements also count as impulses, over the substep h.
         impulses: bool,
     },
-    /// Between impulses and vectors, [`TypeInput::vectors`](super::types::TypeInput::vectors); no row is solved.
+    /// Transfers between impulses and vectors, [`TypeInput::vectors`](super::types::TypeInput::vectors); no
+    /// row is solved.
     Vector(VectorTask),
     /// Only springs and motors act.
     Drive,
-    /// Accumulated impulses are added to those of the step, for metrics.
+    /// Accumulated impulses are added to the totals of the step, for metrics.
     Book,
     /// Records take up the impulses of rigid rows that sweeps leave alone.
     TakeUp,
-    /// The solver does not start warm: only accumulated impulses are set to zero.
+    /// No warm starting: accumulated impulses are set to zero, and nothing else happens.
     Forget,
 }
 
-/// What a pass between impulses λ and a vector x does, and where it needs one, a second vector y. See
-/// [`rows`](crate::engine::constraints::joints::rows) for b and R.
+/// Task of a pass between impulses λ, a vector x and in some tasks a second vector y.
+/// [`rows`](crate::engine::constraints::joints::rows) defines b and R.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VectorTask {
     /// x = λ
     Impulses,
     /// λ = x
     SetImpulses,
-    /// x = 1/(J M⁻¹ Jᵀ + R), row by row.
+    /// x = 1/(J M⁻¹ Jᵀ + R), row by row
     Masses,
     /// x = J v
     Velocities,
@@ -112,11 +113,11 @@ pub enum VectorTask {
     Soften,
     /// x ← (1 + y R)⁻¹ x, y diagonal
     Yield,
-    /// x becomes the nearest impulses within their bounds.
+    /// x is projected onto the bounds of the impulses.
     Bound,
 }
 
-/// Calls a function that is compiled per width alone, at the lanes of `$width`.
+/// Calls a function that is compiled per width only, at the lanes of `$width`.
 macro_rules! at_width {
     ($width:expr, $($pass:ident)::+($($arg:expr),*)) => {
         match $width {
@@ -129,7 +130,7 @@ macro_rules! at_width {
 }
 pub(crate) use at_width;
 
-/// As [`at_width`], on the lanes of a [`PassWidth`].
+/// As [`at_width`], for the lanes of a [`PassWidth`].
 macro_rules! at_pass_width {
     ($width:expr, $($pass:ident)::+($($arg:expr),*)) => {
         match $width {
@@ -145,22 +146,23 @@ pub(crate) use at_pass_width;
 
 /// A pass over contacts, compiled per width and features.
 ///
-/// To add one, implement this; [`crate::engine::constraints::kernels::velocity::sweep::Sweep`] is the example.
+/// To add one, implement this trait; [`crate::engine::constraints::kernels::velocity::sweep::Sweep`] is an
+/// example.
 pub trait Pass {
-    /// Memory requests per contact with records of this layout.
+    /// Memory accesses per contact with records of this layout.
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane;
 
-    /// Participation of constraints of other types.
+    /// How constraints of other types take part.
     fn mode(&self) -> PassMode {
         PassMode::InTurn
     }
 
-    /// Its treatment of position errors of equality rows, which constraints of other types follow.
+    /// The rule for position errors of equality rows. Constraints of other types follow it.
     fn law(&self) -> Softness {
         Softness::RIGID
     }
 
-    /// Sums of velocity increments, a row each, of a Jacobi sweep.
+    /// Sums of velocity increments of a Jacobi sweep, one row per body.
     fn sums(&mut self) -> &mut [BodyRow] {
         &mut []
     }
@@ -168,7 +170,7 @@ pub trait Pass {
     /// Runs over all segments of `on.batches`, in order.
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>);
 
-    /// Runs the instance for these features.
+    /// Runs the instance compiled for these features.
     fn run_with<L: Lanes>(&mut self, features: &Features, on: PassInput<'_>) {
         match (features.rotation, features.friction, features.two_points) {
             (false, false, false) => self.run::<L, Kernel<false, false, 1>>(on),
@@ -176,22 +178,22 @@ pub trait Pass {
             (true, true, false) => self.run::<L, Kernel<true, true, 1>>(on),
             (true, false, true) => self.run::<L, Kernel<true, false, 2>>(on),
             (true, true, true) => self.run::<L, Kernel<true, true, 2>>(on),
-            // Friction and a second point act through rotation.
+            // Friction and a second point have an effect only with rotation.
             (false, ..) => unreachable!("friction or a second point without rotation"),
         }
     }
 }
 
-/// The lanes that a pass runs at: a width, or one lane that counts its operations.
+/// Lanes of a pass: a width, or one lane that counts its operations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PassWidth {
     /// Lanes per instruction.
     pub width: LaneWidth,
-    /// Whether operations are counted; then the width is 1.
+    /// Whether operations are counted; if so, the width is 1.
     pub counted: bool,
 }
 
-/// A [`Pass`] behind a pointer: what [`crate::engine::constraints::step::Passes::run`] takes.
+/// A type-erased [`Pass`], the argument of [`crate::engine::constraints::step::Passes::run`].
 pub trait AnyPass {
     /// [`Pass::traffic`]
     fn traffic_of(&self, layout: &Layout, opposite: OppositeKind) -> PerLane;
@@ -205,7 +207,7 @@ pub trait AnyPass {
     /// [`Pass::sums`]
     fn sums_of(&mut self) -> &mut [BodyRow];
 
-    /// Runs the instance for this width and these features.
+    /// Runs the instance compiled for this width and these features.
     fn run_at(&mut self, width: PassWidth, features: &Features, on: PassInput<'_>);
 }
 

@@ -1,26 +1,26 @@
-//! The position sweep: overlap is removed by moving bodies, velocities are left alone.
+//! The position sweep. It removes overlap by moving bodies and leaves velocities unchanged.
 //!
-//! Every overlapping point is pushed apart by the impulse-like p = −C m_eff, which moves bodies as
-//! an impulse changes velocities, Δx = m⁻¹ p n and Δθ = I⁻¹ (r × n) p, with
+//! Every overlapping point is pushed apart by the impulse-like p = −C m_eff. It moves bodies as an impulse
+//! changes velocities, Δx = m⁻¹ p n and Δθ = I⁻¹ (r × n) p, with
 //!
 //! ```text
 //! C = max(β (s + slop), −C_max)   where s < −slop,   0 elsewhere
 //! ```
 //!
-//! (`catto2024solver2d`, `solve_pgs_ngs`). Positions are updated at once and the next point sees
-//! them: nonlinear Gauss–Seidel.
+//! (`catto2024solver2d`, `solve_pgs_ngs`). Positions are updated at once, and the next point uses them:
+//! nonlinear Gauss–Seidel.
 //!
 //! # Anchors that turn
 //!
-//! With frozen arms the Jacobian is that of the start of the step. With turned ones it follows the
-//! body: an anchor r = −(r × t) n + (r × n) t that has turned by Δθ has
+//! With frozen arms the Jacobian is that of the start of the step. With turned arms it follows the body: an
+//! anchor r = −(r × t) n + (r × n) t that has turned by Δθ has
 //!
 //! ```text
 //! R r × n = cos Δθ (r × n) + sin Δθ (r × t)
 //! ```
 //!
-//! because R n = cos Δθ n − sin Δθ t and R t = cos Δθ t + sin Δθ n; n itself stays. So the two
-//! arms in the record are enough, and 1/m_eff = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (R r_a × n)² + I_b⁻¹ (R r_b × n)².
+//! because R n = cos Δθ n − sin Δθ t and R t = cos Δθ t + sin Δθ n; n itself is fixed. So the two arms in the
+//! record suffice, and 1/m_eff = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (R r_a × n)² + I_b⁻¹ (R r_b × n)².
 
 use crate::engine::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, arms, spin, to_frame, turn, with_arms,
@@ -36,19 +36,20 @@ use crate::engine::lanes::{BodyRow, Lanes};
 /// One sweep; see the [module](self).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PositionSweep {
-    /// β: share of the overlap that a sweep removes (1).
+    /// β: fraction of the overlap that a sweep removes (1).
     pub fraction: f32,
-    /// Overlap that is left alone (m).
+    /// Overlap that is not corrected (m).
     pub slop: f32,
-    /// C_max of overlap (m), and of angles of joints (rad): more would turn bodies further than a linearized contact can follow.
+    /// C_max of overlaps (m) and of joint angles (rad). Larger corrections would turn bodies too far for a
+    /// linearized contact.
     pub max_correction: [f32; 2],
-    /// Arms follow the bodies' turn within the step.
+    /// Whether arms turn with their bodies within the step.
     pub turned: bool,
 }
 
 impl Pass for PositionSweep {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        // Normal; arms, separation and mass of each point.
+        // Reads the normal; arms, separation and mass of each point.
         PerLane::of_bodies(2 + layout.points * (layout.arms() + 2), 0, opposite)
     }
 
@@ -95,7 +96,7 @@ fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
                 if O::HAS_ROW {
                     k = (inertia[0] * arm_n[0]).mul_add(arm_n[0], k);
                 }
-                // A point that is not there has no mass, and keeps none.
+                // A missing point has zero mass, and keeps it.
                 mass = mass.select_positive(L::splat(1.0) / k, L::zero());
             }
             let overlap = (-(separation + L::splat(sweep.slop))).max(L::zero());

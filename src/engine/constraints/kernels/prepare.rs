@@ -1,4 +1,5 @@
-//! Contacts into constraint records at the start of a step, impulses back at its end.
+//! Fills constraint records from contacts at the start of a step, and stores impulses in the contacts at its
+//! end.
 
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
 use crate::engine::constraints::kernels::stages::over_segments;
@@ -12,16 +13,16 @@ use crate::engine::lanes::{BodyRow, Lanes, Quad, prefetch_records};
 const INV_MASS: usize = 3;
 const INV_INERTIA: usize = 7;
 
-/// Batches between asking for contacts and reading them.
+/// Prefetch distance of contacts, in batches.
 const AHEAD: usize = 2;
 
-/// Fills the records of a segment, in lanes throughout: contacts are gathered by quads.
+/// Fills the records of a segment, in lanes throughout. Contacts are gathered by quads.
 ///
 /// The arms are r × n and r × t = −(r·n); the effective masses 1/k with
 /// k = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (r_a × u)² + I_b⁻¹ (r_b × u)², u = n and t.
 ///
-/// Lanes without a contact, and points that a contact does not have, get effective mass
-/// zero and impulse zero: whatever velocity they see, their impulse stays zero.
+/// Lanes without a contact, and points that a contact does not have, get zero effective mass and zero
+/// impulse. Their impulse stays zero at any velocity.
 #[inline(always)]
 fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     rows: &mut [BodyRow],
@@ -36,10 +37,10 @@ fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
     let records = records.chunks_exact_mut(layout.stride);
     let indices = contact.batches().zip(row_a.batches().zip(row_b.batches()));
     for (batch, (record, (index, (row_a, row_b)))) in records.zip(indices).enumerate() {
-        // Contacts of a color lie far apart in memory, where the hardware does not look ahead.
+        // Contacts of a color lie far apart in memory, so the hardware does not prefetch them.
         let coming = contact.entries_of(batch + AHEAD, L::WIDTH);
         prefetch_records::<STRIDE>(quads, coming.iter().copied());
-        // Only a segment's last batch has empty lanes. They read a contact and ignore it.
+        // Only a segment's last batch has empty lanes. Their contact is read and then masked out.
         let mut present = L::splat(1.0);
         let filled = segment.filled(batch, L::WIDTH);
         if filled < L::WIDTH {
@@ -67,7 +68,7 @@ fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
                     L::gather_quads::<STRIDE, STATE_1>(quads, index),
                 )
             };
-            // Counts are integers, compared as the bits of floats.
+            // Counts are integers and are compared as the bits of floats.
             let active = if p == 0 {
                 count.select_equal(L::zero(), L::zero(), present)
             } else {
@@ -110,7 +111,7 @@ pub struct Prepare;
 
 impl Pass for Prepare {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        // The index of the contact; the masses of bodies.
+        // Reads the index of the contact and the masses of the bodies.
         PerLane { halves: 0, ..PerLane::of_bodies(1, layout.stride, opposite) }
     }
 
@@ -151,8 +152,8 @@ pub fn store<L: Lanes, N: KernelFeatures>(batches: &mut Batches, contacts: &mut 
     });
 }
 
-/// Writes the accumulated impulses of a segment back to its contacts, in lanes. Compiled per width
-/// alone: this pass waits for memory, and a branch on the layout per batch costs nothing.
+/// Writes the accumulated impulses of a segment back to its contacts, in lanes. Compiled per width only: this
+/// pass is memory-bound, so a branch on the layout per batch costs nothing.
 #[inline(never)]
 fn store_segment<L: Lanes>(
     batches: &mut Batches,

@@ -1,9 +1,10 @@
-//! Iteration of a kernel over the batches of a segment: one by one, or several together in stages.
+//! Iteration of a kernel over the batches of a segment, one by one or several at a time in stages.
 //!
-//! A sweep gathers bodies and forms rows, solves the rows, and applies and scatters: three stages. One batch needs more
-//! registers than there are, and its chain of a hundred dependent instructions fills the window of out-of-order
-//! execution. Where several batches are in the same stage, a stage needs fewer registers, and its short chain overlaps
-//! with that of the next batch. So at four and at eight lanes eight batches go together:
+//! A sweep has three stages: gather bodies and form rows; solve the rows; apply and scatter. A single batch
+//! needs more registers than there are, and its chain of a hundred dependent instructions fills the
+//! out-of-order window. If several batches go through a stage together, the stage needs fewer registers, and
+//! its short chain overlaps with that of the next batch. So at four and at eight lanes, eight batches are
+//! processed together. Change in sweep time:
 //!
 //! ```text
 //! large_pyramid          8 lanes, 16 registers   8 lanes, 32   4 lanes, 32   16 lanes, 32: by 2, by 4
@@ -13,10 +14,11 @@
 //!             relaxing           −1 %                −2 %          −1 %           +11      +5 %
 //! ```
 //!
-//! At sixteen lanes batches go one by one, as they do in segments of fewer than eight, where sweeps
-//! take 0 to 8 % longer than before there were stages (`pyramid:10`, `stack:20`). In other numbers, with 16
-//! registers and eight lanes (`soft_step`, four stages): 2, 4, 8 and 16 batches gained 1, 3, 4 and 3 %. Four stages cost
-//! 4 % more than three where gathering is apart from forming rows, 4 and 6 % where positions are apart from velocities.
+//! At sixteen lanes batches are processed one by one. So are segments of fewer than eight batches, whose
+//! sweeps take 0 to 8 % longer than before stages were introduced (`pyramid:10`, `stack:20`). Other group
+//! sizes, with 16 registers and eight lanes (`soft_step`, four stages): 2, 4, 8 and 16 batches gained 1, 3, 4
+//! and 3 %. Four stages cost 4 % more than three if gathering is separated from forming rows, and 4 and 6 %
+//! more if positions are separated from velocities.
 
 use crate::engine::constraints::kernels::frame::{
     BodyPair, INV_INERTIA, INV_MASS, VX, VY, W, apply, to_frame,
@@ -25,7 +27,7 @@ use crate::engine::constraints::records::batches::{Batches, Segment, SegmentReco
 use crate::engine::constraints::records::features::{KernelFeatures, Layout, Opposite};
 use crate::engine::lanes::{LaneIndex, Lanes, RowStore, align_frame, prefetch};
 
-/// Runs `$kernel::<L, N, O, …>` over every segment with the `O` that the segment is of.
+/// Runs `$kernel::<L, N, O, …>` over every segment, with `O` chosen by the segment.
 macro_rules! over_segments {
     ($kernel:ident, $l:ty, $n:ty $(, $r:ty)*; $rows:expr, $batches:expr $(, $arg:expr)*) => {
         $crate::engine::lanes::align_frame();
@@ -40,12 +42,13 @@ macro_rules! over_segments {
 }
 pub(crate) use over_segments;
 
-/// Prefetch distance of records, in batches. Without, 150 000 contacts cost 2 to 5 times as
-/// much, as their records come from memory; with two batches 5 %, with eight nothing more. Asking only
-/// where records exceed a cache gains nothing below, and costs soft sweeps 8 %.
+/// Prefetch distance of records, in batches. With 150 000 contacts, whose records come from memory, sweeps
+/// take 2 to 5 times as long without prefetching, 5 % longer with a distance of two batches, and no longer
+/// with eight. Prefetching only if the records exceed a cache gains nothing for smaller sets, and costs soft
+/// sweeps 8 %.
 const PREFETCH_BATCHES: usize = 4;
 
-/// Walks the batches of a segment: `visit(rows, record, row_a, row_b)`.
+/// Visits each batch of a segment: `visit(rows, record, row_a, row_b)`.
 #[inline(always)]
 pub(crate) fn for_each_batch<L: Lanes, N: KernelFeatures, O: Opposite, S: RowStore + ?Sized>(
     rows: &mut S,
@@ -67,10 +70,10 @@ pub(crate) fn for_each_batch<L: Lanes, N: KernelFeatures, O: Opposite, S: RowSto
     }
 }
 
-/// Two bodies while the rows of their contact are solved, and what the rows have applied.
+/// State of two bodies while the rows of their contact are solved, and the impulses applied so far.
 #[derive(Clone, Copy)]
 pub(crate) struct PairState<L> {
-    /// Velocities (m/s) and inverse masses (1/kg) of bodies a and b: `[vx, vy, m⁻¹]`, as they were.
+    /// Velocities (m/s) and inverse masses (1/kg) of bodies a and b before the rows: `[vx, vy, m⁻¹]`.
     linear: [[L; 3]; 2],
     /// Inverse inertias of a and b (1/(kg·m²)).
     pub(crate) inertia: [L; 2],
@@ -87,7 +90,7 @@ impl<L: Lanes> PairState<L> {
         PairState { linear: [[L::zero(); 3]; 2], inertia: pair, w: pair, sum: pair }
     }
 
-    /// Reads all but the impulses.
+    /// Reads everything except the impulses.
     #[inline(always)]
     fn read(&mut self, BodyPair { a, b }: &BodyPair<L>) {
         self.linear = [[a[VX], a[VY], a[INV_MASS]], [b[VX], b[VY], b[INV_MASS]]];
@@ -102,14 +105,14 @@ impl<L: Lanes> PairState<L> {
         if O::HAS_ROW { mass_a + mass_b } else { mass_b }
     }
 
-    /// Velocities of b against a along n and t, by motion without spin, as they were (m/s).
+    /// Linear velocity of b relative to a along n and t, before the rows (m/s).
     #[inline(always)]
     pub(crate) fn along<O: Opposite>(&self, record: &[L]) -> [L; 2] {
         let [a, b] = self.linear;
         to_frame::<L, O>([a[0], a[1]], [b[0], b[1]], [record[0], record[1]])
     }
 
-    /// The bodies with all that was applied.
+    /// The bodies with all impulses applied.
     #[inline(always)]
     fn moved<O: Opposite>(&self, record: &[L]) -> BodyPair<L> {
         let (mut a, mut b) = ([L::zero(); 8], [L::zero(); 8]);
@@ -121,14 +124,14 @@ impl<L: Lanes> PairState<L> {
     }
 }
 
-/// A kernel in stages: what it does between gathering bodies and scattering them.
+/// A kernel in stages: the work between gathering bodies and scattering them.
 pub(crate) trait Stages<L: Lanes, N: KernelFeatures, O: Opposite>: Copy {
-    /// Data of a batch that it keeps from one stage to the next, besides the bodies.
+    /// Data of a batch passed from one stage to the next, besides the bodies.
     type Begun: Copy;
 
     fn nothing() -> Self::Begun;
 
-    /// With the bodies at hand: forms the rows. The impulses in `state` are of no meaning yet.
+    /// Forms the rows from the gathered bodies. The impulses in `state` have no meaning yet.
     fn begin(
         self,
         bodies: &BodyPair<L>,
@@ -138,14 +141,14 @@ pub(crate) trait Stages<L: Lanes, N: KernelFeatures, O: Opposite>: Copy {
         begun: &mut Self::Begun,
     );
 
-    /// Solves them, and sets the impulses.
+    /// Solves the rows and sets the impulses.
     fn solve(self, begun: &Self::Begun, record: &mut [L], state: &mut PairState<L>);
 }
 
-/// Batches that go through the stages together.
+/// Number of batches that go through the stages together.
 const GROUP: usize = 8;
 
-/// Runs a kernel over a segment: all contacts of a batch at once.
+/// Runs a kernel over a segment, all contacts of a batch at once.
 #[inline(always)]
 pub(crate) fn in_stages<L, N, O, K, S>(rows: &mut S, batches: &mut Batches, segment: &Segment, kernel: K)
 where
@@ -169,8 +172,8 @@ where
     });
 }
 
-/// As batch by batch, but `GROUP` batches together; the bits are the same, since no two contacts of the segment push the
-/// same body.
+/// Runs `GROUP` batches together. The bits are the same as batch by batch, since no two contacts of the
+/// segment push the same body.
 #[inline(never)]
 fn together<L, N, O, K, S>(rows: &mut S, batches: &mut Batches, segment: &Segment, kernel: K)
 where
@@ -206,7 +209,7 @@ where
         }
         let (now, later) = records.split_at_mut(count * stride);
         for ((state, begun), record) in group.iter_mut().zip(now.chunks_exact_mut(stride)) {
-            // A copy, so that spins stay in registers while records are written.
+            // A copy keeps the spins in registers while records are written.
             let mut copy = *state;
             kernel.solve(begun, record, &mut copy);
             (state.w, state.sum) = (copy.w, copy.sum);

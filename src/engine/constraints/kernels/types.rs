@@ -1,14 +1,14 @@
-//! Constraints of other types than contacts, which join passes, colors and batches.
+//! Constraint types other than contacts. They take part in passes, coloring and batches.
 //!
-//! A type says which bodies its constraints are on and brings its own kernel. Its constraints are
-//! colored together with the contacts, so that the lanes of a color push different bodies
-//! whatever they are of, and every pass of a solver runs over both: within a color the other types
-//! come first, then the contacts. No solver knows which types there are, nor a type which solver runs:
-//! [`TypeRows`] reads and writes bodies as the pass requires, so that one kernel serves Gauss–Seidel and
-//! Jacobi sweeps.
+//! A type lists the bodies of its constraints and brings its own kernel. Its constraints are colored together
+//! with the contacts, so that no two lanes of a color push the same body, whatever their types. Every pass of
+//! a solver covers both: within a color, constraints of other types come first, then contacts. Solvers are
+//! independent of the types, and types of the solver: [`TypeRows`] reads and writes bodies as the pass
+//! requires, so one kernel serves Gauss–Seidel and Jacobi sweeps.
 //!
-//! A solver that has no passes takes constraints one by one as [`RowBlock`]s ([`ConstraintType::collect`]); what has none
-//! does nothing under such a solver. Its impulses join the vectors of solvers that use them, if it says how many it has.
+//! A solver without passes takes constraints one by one as [`RowBlock`]s ([`ConstraintType::collect`]);
+//! constraints that provide no blocks have no effect under such a solver. The impulses of a type are part of
+//! the vectors of vector-based solvers if [`ConstraintType::rows`] gives their number.
 
 use crate::engine::bodies::Bodies;
 use crate::engine::clock::Phase;
@@ -26,31 +26,33 @@ use std::fmt;
 
 /// A pass over the constraints of one type.
 pub struct TypeInput<'a> {
-    /// What the pass is for: [`Phase::Prepare`], [`Phase::WarmStart`], [`Phase::Solve`] (with position
+    /// Phase of the pass: [`Phase::Prepare`], [`Phase::WarmStart`], [`Phase::Solve`] (with position
     /// feedback), [`Phase::Relax`] (without), [`Phase::Position`] or [`Phase::Store`].
     pub phase: Phase,
-    /// Whether only effective masses are computed, and the factor on increments in a Jacobi sweep.
+    /// How the pass accesses bodies, or which special task it performs.
     pub mode: PassMode,
     /// The rule of the pass for position errors of equality rows.
     pub law: Softness,
-    /// Springs and motors have acted in this substep, in a pass of [`PassMode::Drive`]: they rest.
+    /// Whether springs and motors have already acted in this substep, in a pass of [`PassMode::Drive`]. If
+    /// so, they are skipped.
     pub driven: bool,
     /// Substep (s).
     pub h: f32,
-    /// Lanes that the pass runs at.
+    /// Lane width of the pass.
     pub width: PassWidth,
     /// The rows of all bodies.
     pub rows: TypeRows<'a>,
-    /// Poses of all bodies at the start of the step, and of the inert one.
+    /// Poses of all bodies at the start of the step, followed by that of the inert body.
     pub poses: &'a [PoseRow],
-    /// Runs over [`Batches::visits`]; what it calls contacts are the constraints of the type.
+    /// Iterate over [`Batches::visits`]. The contacts of these batches are the constraints of the type.
     pub batches: &'a mut Batches,
-    /// Parts of vectors, x and y of [`PassMode::Vector`]; else empty. `[groups × rows × 2]`, see [`ConstraintType::rows`].
+    /// Parts of the vectors x and y of [`PassMode::Vector`]; otherwise empty. `[groups × rows × 2]`, see
+    /// [`ConstraintType::rows`].
     pub vectors: [&'a mut [Block]; 2],
 }
 
-/// One row per body, and an inert one at the end: gathered and written in place or, in a Jacobi sweep,
-/// gathered as they were before it, while what is written is summed up.
+/// One row per body, and an inert one at the end. Rows are gathered and written in place. In a Jacobi sweep,
+/// gathers read the rows from before the sweep, and writes are summed up.
 pub struct TypeRows<'a>(Access<'a>);
 
 enum Access<'a> {
@@ -66,9 +68,9 @@ impl<'a> TypeRows<'a> {
         })
     }
 
-    /// Writes back `[Δx, Δy, Δθ, I⁻¹]`, in lane order: how a position sweep moves bodies.
+    /// Writes back `[Δx, Δy, Δθ, I⁻¹]`, in lane order. Position sweeps move bodies this way.
     ///
-    /// A Jacobi sweep sums up velocities alone: in one, nothing is written.
+    /// In a Jacobi sweep nothing is written, since only velocities are summed up.
     ///
     /// # Panics
     /// If there are fewer rows than the bound of `index`.
@@ -106,7 +108,8 @@ impl RowStore for TypeRows<'_> {
     }
 }
 
-/// A type of constraint between two bodies. `tests/engine/types.rs` is a complete one, a rod; this one leaves bodies alone:
+/// A type of constraint between two bodies. `tests/engine/types.rs` has a complete example, a rod. The type
+/// below does nothing:
 ///
 /// ```
 /// # use simpulse_engine as simpulse;
@@ -144,76 +147,79 @@ pub trait ConstraintType: Any + fmt::Debug + Send {
     /// Bodies a and b of each constraint; b is dynamic.
     fn ends(&self) -> &[[u32; 2]];
 
-    /// Lane vectors of a record.
+    /// Number of lane vectors in a record.
     fn stride(&self) -> usize;
 
-    /// Impulses of a constraint in vectors; those of 16 constraints that follow each other in a segment share as many pairs
-    /// of blocks, of which the second ones are zero. None: vectors know nothing of the type.
+    /// Number of impulses per constraint in vectors; 0 if the type takes no part in vectors. Sixteen
+    /// consecutive constraints of a segment share this many pairs of blocks; the second block of each pair is
+    /// zero.
     fn rows(&self) -> usize {
         0
     }
 
-    /// Called before the passes of a step, of substeps of `h` (s).
+    /// Called before the passes of each step; `h` is the substep (s).
     fn begin(&mut self, _bodies: &Bodies, _h: f32) {}
 
-    /// Runs one pass. Every width is to give the same bits.
+    /// Runs one pass. All widths must give the same bits.
     ///
     /// In [`PassMode::Masses`] it recomputes the effective masses in its records from the rows, whatever the
-    /// phase; in [`PassMode::Jacobi`] it multiplies its increments by `relaxation`; in [`PassMode::Forget`] it
-    /// sets its accumulated impulses to zero and does nothing else.
+    /// phase. In [`PassMode::Jacobi`] it multiplies its increments by `relaxation`. In [`PassMode::Forget`]
+    /// it sets its accumulated impulses to zero and does nothing else.
     fn run(&mut self, on: TypeInput<'_>);
 
-    /// Appends the blocks of a constraint as bodies are now, with the impulses that [`Self::impulses`] has: for solvers
-    /// that are no sweeps. A constraint that has none does nothing under those.
+    /// Appends the blocks of a constraint for the current state of the bodies, with the impulses of
+    /// [`Self::impulses`]. For solvers that do not sweep; a constraint without blocks has no effect under
+    /// those.
     fn collect(&mut self, _constraint: usize, _on: Placed<'_>, _to: &mut Vec<RowBlock>) {}
 
-    /// Takes over the impulses of its `blocks`, which are those of [`Self::collect`].
+    /// Takes over the impulses of `blocks`, which come from [`Self::collect`].
     fn replace(&mut self, _constraint: usize, _on: Placed<'_>, _blocks: &[RowBlock]) {}
 
-    /// Rows of the rigid block that each constraint has; 0 if there is none, or more than one.
+    /// Number of rows in the rigid block of each constraint; 0 if it has none or more than one.
     fn rigid_size(&self) -> usize {
         0
     }
 
-    /// These constraints are links of chains from now on, and no others: the others' passes leave their rigid rows alone. In the
-    /// order of their slots; `poses` are those at the start of the step.
+    /// Sets which constraints are links of chains, in the order of their slots. Passes of the type leave the
+    /// rigid rows of links alone. `poses` are those at the start of the step.
     fn link(&mut self, _links: &[ChainLink], _poses: &[PoseRow]) {}
 
-    /// Writes the rigid rows of links as bodies are now.
+    /// Writes the rigid rows of links for the current state of the bodies.
     fn link_rows(&mut self, _rows: &[BodyRow], _by: LinkRule, _to: &mut LinkRows) {}
 
-    /// Whether sweeps have nothing to do: all rows are those of links.
+    /// Whether sweeps have nothing to do because all rows belong to links.
     fn is_idle(&self) -> bool {
         false
     }
 
-    /// Sets the impulses of links; records take them up in [`PassMode::TakeUp`].
+    /// Sets the impulses of links. Records take them up in [`PassMode::TakeUp`].
     fn set_linked(&mut self, _impulses: &LinkImpulses) {}
 
-    /// Accumulated impulses of a constraint (N·s or N·m·s), for those who ask.
+    /// Accumulated impulses of a constraint (N·s or N·m·s), for inspection.
     fn impulses(&self, _constraint: usize) -> &[f32] {
         &[]
     }
 
-    /// Impulses of a constraint in the last step, where they were recorded ([`PassMode::Book`]).
+    /// Impulses of a constraint in the last step, if they were recorded ([`PassMode::Book`]).
     fn booked(&self, _constraint: usize) -> Option<Booked> {
         None
     }
 
-    /// As [`Self::collect`], with the impulses of the whole last step, where they were recorded ([`PassMode::Book`]); else zeros.
+    /// As [`Self::collect`], with the impulses of the whole last step if they were recorded
+    /// ([`PassMode::Book`]), otherwise zeros.
     fn collect_booked(&mut self, _constraint: usize, _on: Placed<'_>, _to: &mut Vec<RowBlock>) {}
 
-    /// Angle of a constraint's bodies, counted on from turn to turn (rad).
+    /// Relative angle of a constraint's bodies, counted across full turns (rad).
     fn angle(&self, _constraint: usize) -> f32 {
         0.0
     }
 
-    /// Bytes held, without batches.
+    /// Allocated bytes, without batches.
     fn held_bytes(&self) -> usize {
         0
     }
 
-    /// A copy, with what it keeps from step to step: a world that is held still gets it back.
+    /// A copy that includes the state kept from step to step: it is used to save and restore a world.
     fn boxed(&self) -> Box<dyn ConstraintType>;
 }
 
@@ -223,37 +229,38 @@ impl Clone for Box<dyn ConstraintType> {
     }
 }
 
-/// Impulses of a constraint on its bodies a and b in a step: `[N·s, N·s, N·m·s]` each, about their centers of mass.
+/// Impulses of a constraint on its bodies a and b in one step: `[N·s, N·s, N·m·s]` each, about their centers
+/// of mass.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Booked {
-    /// All of them.
+    /// Sum of all impulses.
     pub all: [[f32; 3]; 2],
-    /// Impulses of springs and motors, which add and remove energy by design.
+    /// The part due to springs and motors, which add and remove energy by design.
     pub driving: [[f32; 3]; 2],
 }
 
-/// Where bodies are: one row and one pose at the start of the step for each, and an inert one at the end.
+/// State of all bodies: one row and one pose at the start of the step for each, and an inert one at the end.
 #[derive(Clone, Copy, Debug)]
 pub struct Placed<'a> {
     /// Velocities, and displacements since the start of the step.
     pub rows: &'a [BodyRow],
-    /// At the start of the step.
+    /// Poses at the start of the step.
     pub poses: &'a [PoseRow],
 }
 
-/// A type and the lanes of its constraints.
+/// A constraint type with the batches of its constraints.
 #[derive(Clone, Debug)]
 pub struct Joined {
     /// The type.
     pub kind: Box<dyn ConstraintType>,
     /// Colored batches at the width of the step.
     pub(crate) lanes: Batches,
-    /// The constraints that are solved one after the other.
+    /// Batches of constraints that are solved one after the other.
     pub(crate) serial: Batches,
 }
 
 impl Joined {
-    /// A type that no lanes have been assigned for.
+    /// A type whose constraints are not yet assigned to lanes.
     pub fn new(kind: Box<dyn ConstraintType>) -> Self {
         Joined { kind, lanes: Batches::default(), serial: Batches::default() }
     }
@@ -263,12 +270,12 @@ impl Joined {
         [&mut self.lanes, &mut self.serial]
     }
 
-    /// Bytes of records and indices.
+    /// Size of records and indices in bytes.
     pub fn bytes(&self) -> usize {
         self.lanes.bytes() + self.serial.bytes()
     }
 
-    /// Rows of sixteen constraints in vectors.
+    /// Rows in vectors, in groups of sixteen constraints.
     pub(crate) fn vector_rows(&self) -> usize {
         self.kind.rows() * (self.lanes.groups() + self.serial.groups())
     }

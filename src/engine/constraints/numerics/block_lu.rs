@@ -1,16 +1,16 @@
-//! Systems of B × B blocks whose entries are near the diagonal, once their rows are in the right order.
+//! Systems of B × B blocks whose entries are close to the diagonal once their rows are in the right order.
 //!
-//! Bodies that touch or are joined couple: chains, stacks and pyramids have narrow bands, and islands do not couple at all.
-//! Blocks are ordered by breadth (`cuthill1969`). Then L has in row i, and U in column i, no block before the first one f_i
-//! of the matrix there, and for f = max(f_i, f_j)
+//! Bodies that touch or are joined couple. Chains, stacks and pyramids have narrow bands, and islands do not
+//! couple at all. Blocks are ordered by breadth (`cuthill1969`). Then row i of L, and column i of U, have no
+//! block before the first one f_i of A there, and for f = max(f_i, f_j)
 //!
 //! ```text
 //! L_ij = (A_ij − Σ_{k=f..j} L_ik U_kj) U_jj⁻¹,   U_ji = A_ji − Σ_{k=f..j} L_jk U_ki,   j < i
 //! U_ii = A_ii − Σ_k L_ik U_ki
 //! ```
 //!
-//! in n b² products of blocks for n rows of b blocks. The pattern of A is symmetric, its values need not be. Pivots stay on
-//! the diagonal: whoever asks checks what he gets.
+//! in n b² products of blocks for n rows of b blocks. The pattern of A is symmetric, its values need not be.
+//! Pivots stay on the diagonal, so callers must check their results.
 
 use super::envelope::by_breadth;
 
@@ -19,7 +19,7 @@ type LuBlock<const B: usize> = [[f64; B]; B];
 /// A system and its factors; keeps its memory.
 #[derive(Clone, Debug, Default)]
 pub struct BlockLu<const B: usize> {
-    /// The block row of A that is the i-th, and the other way round.
+    /// The block row of A at each place, and its inverse: the place of each block row.
     order: Vec<usize>,
     place: Vec<usize>,
     /// f_i, and where row i of L and column i of U begin.
@@ -32,7 +32,8 @@ pub struct BlockLu<const B: usize> {
 }
 
 impl<const B: usize> BlockLu<B> {
-    /// Begins a system of zeros of `n` rows in which row i couples with `neighbors(i)`, of which some may be i itself.
+    /// Begins a system of zeros with `n` rows, in which row i couples with `neighbors(i)`. These may include
+    /// i itself.
     pub fn begin<I: Iterator<Item = usize>>(&mut self, n: usize, neighbors: impl Fn(usize) -> I) {
         by_breadth(n, &neighbors, [&mut self.order, &mut self.place]);
         self.first.clear();
@@ -52,7 +53,7 @@ impl<const B: usize> BlockLu<B> {
         }
     }
 
-    /// Zeros of the same pattern.
+    /// Sets all blocks to zero; the pattern remains.
     pub fn clear(&mut self) {
         for values in [&mut self.lower, &mut self.upper, &mut self.diagonal] {
             values.fill([[0.0; B]; B]);
@@ -62,7 +63,7 @@ impl<const B: usize> BlockLu<B> {
     /// Adds to a block of A.
     ///
     /// # Panics
-    /// If the two do not couple.
+    /// If the row and the column do not couple.
     #[inline]
     pub fn add(&mut self, row: usize, column: usize, values: LuBlock<B>) {
         let [i, j] = [row, column].map(|k| self.place[k]);
@@ -77,7 +78,7 @@ impl<const B: usize> BlockLu<B> {
         }
     }
 
-    /// L and U of A. False if one of the U_ii is singular.
+    /// Computes L and U of A. False if one of the U_ii is singular.
     pub fn factorize(&mut self) -> bool {
         for i in 0..self.diagonal.len() {
             let (start, first) = (self.start[i], self.first[i]);
@@ -104,7 +105,7 @@ impl<const B: usize> BlockLu<B> {
         true
     }
 
-    /// x of A x = b after [`Self::factorize`], in the place of b.
+    /// Solves A x = b after [`Self::factorize`]; b becomes x.
     pub fn solve(&self, b: &mut [[f64; B]]) {
         let mut x: Vec<[f64; B]> = self.order.iter().map(|&row| b[row]).collect();
         for i in 0..x.len() {
@@ -138,7 +139,8 @@ fn subtract<const B: usize>(a: &mut LuBlock<B>, l: &LuBlock<B>, u: &LuBlock<B>) 
     }
 }
 
-/// Of a small matrix, by elimination with the largest entry of a column as its pivot; none if it is singular.
+/// Inverse of a small matrix, by elimination with the largest entry of a column as its pivot. `None` if it is
+/// singular.
 pub fn inverse<const B: usize>(mut a: LuBlock<B>) -> Option<LuBlock<B>> {
     let mut x: LuBlock<B> = std::array::from_fn(|r| std::array::from_fn(|c| f64::from(u8::from(r == c))));
     for k in 0..B {
@@ -166,7 +168,7 @@ pub fn inverse<const B: usize>(mut a: LuBlock<B>) -> Option<LuBlock<B>> {
 mod tests {
     use super::*;
 
-    /// A chain of six in a mixed order, a loop of three, and a row alone.
+    /// A chain of six in a mixed order, a loop of three, and a single row.
     const EDGES: [(usize, usize); 8] = [(3, 0), (0, 5), (5, 1), (1, 4), (4, 2), (6, 7), (7, 8), (8, 6)];
     const ROWS: usize = 10;
 
@@ -185,7 +187,7 @@ mod tests {
         let mut system = BlockLu::<B>::default();
         for _ in 0..2 {
             system.begin(ROWS, |i| (0..ROWS).filter(move |&j| entry(i, j, 0, B - 1) != 0.0));
-            // The band of the chain is one, of the loop two.
+            // The band of the chain is one block wide, that of the loop two.
             assert!(system.lower.len() <= 5 + 3, "{}", system.lower.len());
             system.clear();
             for (i, j) in (0..ROWS).flat_map(|i| (0..ROWS).map(move |j| (i, j))) {

@@ -2,8 +2,8 @@
 
 use crate::engine::lanes::Lanes;
 
-/// The nearest point of the cone. In the plane the cone is a wedge: what is in it stays, what is
-/// in its polar goes to the tip, and the rest to the nearer side, (1, ±µ) times
+/// The nearest point of the cone. In the plane the cone is a wedge: a point inside it stays, a point
+/// inside its polar goes to the tip, and any other point goes to the nearer side, (1, ±µ) times
 /// (λn + µ |λt|)/(1 + µ²).
 #[inline(always)]
 pub fn project<L: Lanes>([normal, tangent]: [L; 2], friction: L) -> [L; 2] {
@@ -12,12 +12,12 @@ pub fn project<L: Lanes>([normal, tangent]: [L; 2], friction: L) -> [L; 2] {
     let along = (friction.mul_add(slide, normal) / scale).max(L::zero());
     let side = friction * along;
     let side = tangent.select_positive(side, -side);
-    // Above zero outside of the cone; without friction the cone is the half-line λn ≥ 0.
+    // Positive outside the cone. Without friction the cone is the half-line λn ≥ 0.
     let outside = (slide - friction * normal).max(-normal);
     [outside.select_positive(along, normal), outside.select_positive(side, tangent)]
 }
 
-/// As [`project`]; a negative `friction` marks what is no contact point, and stays as it is.
+/// As [`project`]. A negative `friction` marks entries that are not contact points, which stay unchanged.
 #[inline(always)]
 pub fn project_point<L: Lanes>(point: [L; 2], friction: L) -> [L; 2] {
     let nearest = project(point, friction);

@@ -1,11 +1,11 @@
-//! Coulomb's law as a linear complementarity problem: in the plane it *is* one.
+//! Coulomb's law as a linear complementarity problem, which is exact in the plane.
 //!
 //! **Source**: Stewart & Trinkle 1996; Anitescu & Potra 1997 (solvability, copositive A). In 3D
-//! their friction cone is a pyramid, an approximation; in 2D it has just the two edges ±t, so
+//! their friction cone is a pyramid, an approximation. In 2D it has only the two edges ±t, so
 //! nothing is lost.
 //!
-//! Split λt = β⁺ − β⁻ with β ≥ 0 and let σ be the slip speed. With u = G λ + b, b being the relative velocity
-//! without impulses and what the law adds to it:
+//! Split λt = β⁺ − β⁻ with β ≥ 0, and let σ be the slip speed. Let u = G λ + b, where b is the relative
+//! velocity without impulses plus what the law adds to it:
 //!
 //! ```text
 //! 0 ≤ λn ⊥ un                   ≥ 0
@@ -18,12 +18,12 @@
 //! λt = −µ λn by the fourth. Sticking has ut = σ = 0. So w = A z + q; a frictionless contact has only its
 //! first row.
 //!
-//! A is scaled by S = 1/√G_ii on both sides of impulse rows and by the inverse on σ: G gets a unit
+//! A is scaled by S = 1/√G_ii on both sides of impulse rows, and by the inverse on σ: G gets a unit
 //! diagonal whatever the masses, the 1s stay 1, and µ becomes µ √(G_tt/G_nn). q is divided by its largest
-//! entry, which gives tolerances a meaning: the problem is homogeneous in (z, q).
+//! entry, so that tolerances have a fixed scale: the problem is homogeneous in (z, q).
 //!
-//! A row with bounds of its own, |λ| ≤ c, is a tangential row whose µ λn is the number c: the last line becomes
-//! 0 ≤ σ ⊥ c − β⁺ − β⁻ ≥ 0. A row with λ ≥ 0 is a point without friction.
+//! A row with its own bounds, |λ| ≤ c, is a tangential row with the number c instead of µ λn: the last line
+//! becomes 0 ≤ σ ⊥ c − β⁺ − β⁻ ≥ 0. A row with λ ≥ 0 is a point without friction.
 
 use crate::engine::constraints::numerics::lemke::{LemkeOutcome, lemke};
 use crate::engine::constraints::numerics::matrix::Matrix;
@@ -36,17 +36,18 @@ pub type DPair = [f64; 2];
 pub struct CoulombLcp {
     a: Matrix,
     q: Vec<f64>,
-    /// Scale of q.
+    /// Factor by which q was divided.
     unit: f64,
     /// 1/√G_ii
     scale: Vec<DPair>,
-    /// Rows of G that have two sides: tangential ones of points with friction, then those with bounds of their own.
+    /// Rows of G with two-sided bounds: tangential rows of points with friction, then rows with bounds of
+    /// their own.
     bounded: Vec<usize>,
 }
 
 impl CoulombLcp {
-    /// The law of points with these Coulomb coefficients. `diagonal` and `free` are G_ii (1/kg) and b (m/s) of each;
-    /// `g(row, column)` are the entries of G, whose rows and columns are (n₀, t₀, n₁, t₁, …).
+    /// The law of points with these Coulomb coefficients. `diagonal` and `free` are G_ii (1/kg) and b (m/s)
+    /// of each point. `g(row, column)` are the entries of G, whose rows and columns are (n₀, t₀, n₁, t₁, …).
     pub fn new(
         friction: &[f64],
         diagonal: &[DPair],
@@ -56,8 +57,8 @@ impl CoulombLcp {
         Self::with_caps(friction, &[], diagonal, free, g)
     }
 
-    /// The same with rows of |λ| ≤ `caps` (N·s) behind those of points: each has a row of G, and a pair of `diagonal` and `free`
-    /// for two of them.
+    /// As [`Self::new`], with rows of |λ| ≤ `caps` (N·s) after those of points. Each has one row of G. Every
+    /// two of them share a pair of `diagonal` and `free`.
     pub fn with_caps(
         friction: &[f64],
         caps: &[f64],
@@ -72,8 +73,8 @@ impl CoulombLcp {
         let sided = bounded.len();
         let n = points + 3 * sided;
         let scale: Vec<DPair> = diagonal.iter().map(|g| g.map(|g| 1.0 / g.sqrt())).collect();
-        // Normal rows of all points; then β⁺ and β⁻ of each row with two sides; then σ.
-        // An impulse row is a row of G and a sign; a σ row has none.
+        // Normal rows of all points; then β⁺ and β⁻ of each two-sided row; then σ.
+        // An impulse row is a row of G and a sign; a σ row has neither.
         let impulse_row = |row: usize| {
             if row < points {
                 Some((2 * row, 1.0))
@@ -107,7 +108,7 @@ impl CoulombLcp {
                 q[slip(k)] = caps[k - frictional.len()] / scaled(i);
             }
         }
-        // Caps may be as good as infinite.
+        // Caps are not included: they may be practically infinite.
         let unit = q[..points + 2 * sided].iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         if unit > 0.0 {
             q.iter_mut().for_each(|x| *x /= unit);
@@ -115,13 +116,14 @@ impl CoulombLcp {
         CoulombLcp { a, q, unit, scale, bounded }
     }
 
-    /// Rows: one of each point, and three more of each with friction; three of each row with a cap.
+    /// Number of rows: one for each point, three more for each point with friction, and three for each row
+    /// with a cap.
     pub fn rows(&self) -> usize {
         self.q.len()
     }
 
-    /// (λn, λt) of all points (N·s) by Lemke's method with this covering vector, by at most `pivots` pivots, or
-    /// why there is no answer. Behind them are the rows with caps, two in a pair.
+    /// (λn, λt) of all points (N·s) by Lemke's method with this covering vector and at most `pivots` pivots,
+    /// or the reason why there is no answer. The rows with caps come after the points, two in a pair.
     ///
     /// # Panics
     /// If `covering` is not [`Self::rows`] long.
@@ -145,7 +147,7 @@ impl CoulombLcp {
 mod tests {
     use super::*;
 
-    /// A mass point of 2 kg that is pushed onto a floor, and along it by `along` (m/s), at µ = 0.5.
+    /// A mass point of 2 kg is pushed onto a floor, and along it by `along` (m/s), at µ = 0.5.
     fn pushed(along: f64) -> DPair {
         let g = |row, column| if row == column { 0.5 } else { 0.0 };
         let law = CoulombLcp::new(&[0.5], &[[0.5; 2]], &[[-3.0, along]], g);
@@ -161,7 +163,7 @@ mod tests {
         }
     }
 
-    /// A mass of 2 kg that moves at 3 m/s against a brake of `cap` N·s: it stops, or the brake slips.
+    /// A mass of 2 kg moves at 3 m/s against a brake of `cap` N·s: it stops, or the brake slips.
     #[test]
     fn a_row_with_a_cap_holds_up_to_it() {
         for (cap, impulse) in [(10.0, -6.0), (6.5, -6.0), (2.0, -2.0), (0.0, 0.0), (1e12, -6.0)] {
@@ -173,7 +175,7 @@ mod tests {
 
     #[test]
     fn only_points_with_friction_have_rows_of_slip() {
-        // Two points of masses 1 and 4 kg; the second parts by itself.
+        // Two points of masses 1 and 4 kg; the second one separates by itself.
         let mass = [1.0, 1.0, 0.25, 0.25];
         let g = |row: usize, column| if row == column { mass[row] } else { 0.0 };
         let law = CoulombLcp::new(&[0.0, 0.3], &[[1.0; 2], [0.25; 2]], &[[-2.0, 5.0], [1.0, 1.0]], g);

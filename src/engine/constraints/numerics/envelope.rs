@@ -1,5 +1,6 @@
-//! Symmetric systems whose entries are near the diagonal, once their rows are in the right order, as in [`super::block_lu`].
-//! Their factor has in row i no entry before the first one of the matrix there, and half the work and the memory of L and U.
+//! Symmetric systems whose entries are close to the diagonal once their rows are in the right order, as in
+//! [`super::block_lu`]. Row i of their factor has no entry before the first one of the matrix. The factor
+//! takes half the work and the memory of L and U.
 
 /// Not yet ordered.
 const NONE: usize = usize::MAX;
@@ -7,7 +8,7 @@ const NONE: usize = usize::MAX;
 /// A system and its factors; keeps its memory.
 #[derive(Clone, Debug, Default)]
 pub struct Envelope {
-    /// The row of A that is the i-th, and the other way round.
+    /// The row of A at each place, and its inverse: the place of each row.
     order: Vec<usize>,
     place: Vec<usize>,
     /// First entry of row i, and where the row begins in `lower`.
@@ -19,8 +20,8 @@ pub struct Envelope {
 }
 
 impl Envelope {
-    /// Begins a system of zeros of `n` blocks of B rows each, in which block i couples with the blocks `neighbors(i)`; some may be
-    /// i itself.
+    /// Begins a system of zeros with `n` blocks of B rows each, in which block i couples with the blocks
+    /// `neighbors(i)`. These may include i itself.
     pub fn begin<const B: usize, I: Iterator<Item = usize>>(
         &mut self,
         n: usize,
@@ -55,28 +56,29 @@ impl Envelope {
         self.diagonal.resize(B * n, 0.0);
     }
 
-    /// Entries of the lower half, without the diagonal.
+    /// Number of entries below the diagonal.
     pub fn entries(&self) -> usize {
         self.lower.len()
     }
 
-    /// Multiplications of a factorization.
+    /// Number of multiplications in a factorization.
     pub fn work(&self) -> f64 {
         let rows = self.first.iter().enumerate();
         rows.map(|(i, first)| 0.5 * (i - first).pow(2) as f64).sum()
     }
 
-    /// Zeros of the same pattern.
+    /// Sets all entries to zero; the pattern remains.
     pub fn clear(&mut self) {
         for values in [&mut self.lower, &mut self.diagonal] {
             values.fill(0.0);
         }
     }
 
-    /// Adds to a block of a symmetric A, and to its mirror image; of a block on the diagonal the lower half counts.
+    /// Adds to a block of a symmetric A, and to its mirror image. Only the lower half of a diagonal block is
+    /// used.
     ///
     /// # Panics
-    /// If the two do not couple.
+    /// If the row and the column do not couple.
     pub fn add_block<const B: usize>(&mut self, row: usize, column: usize, values: [[f64; B]; B]) {
         let [i, j] = [row, column].map(|block| self.place[B * block]);
         for (r, row) in values.iter().enumerate() {
@@ -92,7 +94,7 @@ impl Envelope {
         }
     }
 
-    /// Cholesky's factor of a symmetric A, L Lᵀ with rows as long as those of A:
+    /// Cholesky factorization of a symmetric A, L Lᵀ. Rows of L are as long as those of A:
     ///
     /// ```text
     /// L_ij = (A_ij − Σ_{k=f..j} L_ik L_jk)/L_jj,   L_ii = √(A_ii − Σ_k L_ik²)
@@ -119,7 +121,7 @@ impl Envelope {
         true
     }
 
-    /// x of L Lᵀ x = b after [`Self::factorize`], in the place of b.
+    /// Solves L Lᵀ x = b after [`Self::factorize`]; b becomes x.
     pub fn substitute(&mut self, b: &mut [f64]) {
         self.solution.clear();
         self.solution.extend(self.order.iter().map(|&row| b[row]));
@@ -142,8 +144,8 @@ impl Envelope {
     }
 }
 
-/// Orders rows by breadth, island by island, each from the row that a search from its first one finds last; `order` is that,
-/// `place` its inverse.
+/// Orders rows by breadth, island by island. Each island starts from the row that a search from its first row
+/// finds last. `order` becomes that order, `place` its inverse.
 pub fn by_breadth<I: Iterator<Item = usize>>(
     n: usize,
     neighbors: &impl Fn(usize) -> I,
@@ -181,7 +183,7 @@ pub fn by_breadth<I: Iterator<Item = usize>>(
     }
 }
 
-/// x·y, in four parts.
+/// x·y, summed in four parts.
 fn dot(x: &[f64], y: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (x4, y4) = (x.chunks_exact(4), y.chunks_exact(4));
@@ -198,7 +200,7 @@ mod tests {
 
     #[test]
     fn symmetric_systems_of_blocks_are_solved_again_and_again() {
-        // Blocks in a loop with a tail, and one alone; A = Σ j jᵀ + 1 over rows j of pairs of blocks.
+        // Blocks in a loop with a tail, and a single one; A = Σ j jᵀ + 1 over rows j of pairs of blocks.
         let edges = [(4usize, 0usize), (0, 2), (2, 4), (4, 1)];
         let (n, mut system) = (6, Envelope::default());
         for round in 0..2 {

@@ -6,9 +6,9 @@
 //! ends when z₀ leaves (a solution) or when no row blocks (a ray).
 //!
 //! **Source**: Cottle, Pang & Stone, *The Linear Complementarity Problem*, §4.4 (the method) and
-//! §4.9 (lexicographic ties). **Kept exact by**: rebuilding the tableau from A and q through an LU
+//! §4.9 (lexicographic ties). **Kept exact by**: rebuilding the tableau from A and q by an LU
 //! factorization every [`REBUILD`] pivots, and computing the final basic solution by LU with
-//! iterative refinement, so that pivot errors do not add up.
+//! iterative refinement. So pivot errors do not add up.
 //!
 //! With `x_B` the basic and `x_N` the other variables, the tableau holds T = B⁻¹ N and q̄ = B⁻¹ q of
 //! `x_B + T x_N = q̄`. The lexicographic rule compares rows of (q̄ | B⁻¹) / T_·c; the columns of B⁻¹
@@ -17,16 +17,16 @@
 use crate::engine::constraints::numerics::matrix::{Lu, Matrix};
 use std::cmp::Ordering;
 
-/// Pivots between two rebuilds of the tableau; a rebuild costs as much as some n/2 pivots.
+/// Pivots between two rebuilds of the tableau. A rebuild costs about as much as n/2 pivots.
 pub const REBUILD: usize = 50;
 
 /// Outcome of Lemke's method.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LemkeOutcome {
-    /// z, with w = A z + q and the complementarity pattern that LU refined.
+    /// z, where w = A z + q. Refined by LU for the final complementarity pattern.
     Solution(Vec<f64>),
-    /// No row blocks the entering variable: the method has no answer (for the matrices of frictional
-    /// contact this means that data are inconsistent).
+    /// No row blocks the entering variable: the method has no answer. For the matrices of frictional
+    /// contact this means that the data are inconsistent.
     Ray,
     /// More pivots than allowed.
     IterationLimit,
@@ -34,28 +34,28 @@ pub enum LemkeOutcome {
     Singular,
 }
 
-/// Pivots taken, and how it ended.
+/// The outcome and the number of pivots.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lemke {
-    /// How it ended.
+    /// How the method ended.
     pub outcome: LemkeOutcome,
-    /// Pivots taken.
+    /// Number of pivots.
     pub pivots: usize,
 }
 
-/// Entries of the entering column below this, relative to its largest, do not block.
+/// Entries of the entering column below this, relative to its largest entry, do not block.
 const PIVOT_TOLERANCE: f64 = 1e-9;
-/// Ratios this close, relative to the larger, are ties.
+/// Ratios this close, relative to the larger one, are ties.
 const TIE_TOLERANCE: f64 = 1e-11;
-/// Basic values below this are zero, for q of order 1. A z₀ this small has left: waiting for it to
-/// block in exact arithmetic's sense ends on spurious rays where rows are degenerate.
+/// Basic values below this are zero, for q of order 1. A z₀ this small counts as having left the basis:
+/// waiting until it blocks, as in exact arithmetic, ends on spurious rays where rows are degenerate.
 const ZERO: f64 = 1e-13;
 
 /// Solves w = A z + q, 0 ≤ w ⊥ z ≥ 0 by at most `limit` pivots.
 ///
 /// A, q and the covering vector d > 0 should be scaled so that their largest entries are of order 1.
-/// In exact arithmetic any d does; where rounding spoils one path, another d takes a different one.
-/// `a` must be square, as long as `q` and `d`.
+/// In exact arithmetic any d works. If rounding spoils one path, another d takes a different one.
+/// `a` must be square, with as many rows as `q` and `d` have entries.
 pub fn lemke(a: &Matrix, q: &[f64], d: &[f64], limit: usize) -> Lemke {
     let n = q.len();
     let end = |outcome, pivots| Lemke { outcome, pivots };
@@ -63,7 +63,7 @@ pub fn lemke(a: &Matrix, q: &[f64], d: &[f64], limit: usize) -> Lemke {
         return end(LemkeOutcome::Solution(vec![0.0; n]), 0);
     }
     let mut t = Tableau::new(a, q, d);
-    // z₀ enters at the row of the lexicographically smallest (q_i, e_i)/d_i: the last of equals.
+    // z₀ enters at the row of the lexicographically smallest (q_i, e_i)/d_i: the last row among equals.
     let ratio = |i: usize| q[i] / d[i];
     let first =
         (0..n).min_by(|&i, &k| ratio(i).total_cmp(&ratio(k)).then(k.cmp(&i))).expect("q is not empty");
@@ -106,7 +106,7 @@ struct Tableau {
 }
 
 impl Tableau {
-    /// w basic, z and z₀ not: T = (−A | −d), q̄ = q.
+    /// w is basic, z and z₀ are not: T = (−A | −d), q̄ = q.
     fn new(a: &Matrix, q: &[f64], d: &[f64]) -> Self {
         let n = q.len();
         let mut t = Tableau {
@@ -146,13 +146,13 @@ impl Tableau {
         self.nonbasic[column]
     }
 
-    /// The row that blocks the variable of `column` first, or none. Among ties z₀ leaves if it
-    /// can, else the lexicographically smallest row.
+    /// The row that blocks the variable of `column` first, if any. Among ties, z₀ leaves if it can, otherwise
+    /// the lexicographically smallest row.
     fn blocking_row(&self, column: usize) -> Option<usize> {
         let entry = |i: usize| self.row(i)[column];
         let largest = (0..self.n).map(|i| entry(i).abs()).fold(0.0, f64::max);
         let candidates: Vec<usize> = (0..self.n).filter(|&i| entry(i) > PIVOT_TOLERANCE * largest).collect();
-        // Rounding may leave a degenerate q̄ below zero.
+        // Rounding may make a degenerate q̄ negative.
         let ratio = |i: usize| self.row(i)[self.n + 1].max(0.0) / entry(i);
         let smallest = candidates.iter().map(|&i| ratio(i)).min_by(f64::total_cmp)?;
         let ties: Vec<usize> = candidates
@@ -181,7 +181,7 @@ impl Tableau {
         if ti.abs().total_cmp(&tk.abs()) == Ordering::Less { k } else { i }
     }
 
-    /// Recomputes T and q̄ from the data for the present basis; false if it is singular.
+    /// Recomputes T and q̄ from the data for the present basis. False if the basis is singular.
     fn rebuild(&mut self, a: &Matrix, q: &[f64], d: &[f64]) -> bool {
         let n = self.n;
         // Columns of (I | −A | −d), the coefficients of (w, z, z₀).
@@ -194,7 +194,7 @@ impl Tableau {
                 -d[i]
             }
         };
-        // Unit columns first, which cost the factorization nothing.
+        // Unit columns come first: they cost the factorization nothing.
         self.basic.sort_unstable();
         let basis = Matrix::from_fn(n, n, |i, j| coefficient(i, self.basic[j]));
         let right = Matrix::from_fn(n, n + 2, |i, j| match self.nonbasic.get(j) {
@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn ties_do_not_cycle() {
-        // All right-hand sides equal and A of rank one plus nothing: every ratio is a tie.
+        // All right-hand sides are equal and A has rank one: every ratio is a tie.
         let n = 30;
         let a = Matrix::from_fn(n, n, |_, _| 1.0);
         let LemkeOutcome::Solution(z) = lemke(&a, &vec![-1.0; n], &vec![1.0; n], 1000).outcome else {

@@ -1,16 +1,16 @@
 //! Dense matrices in `f64`, and the one elimination of the engine.
 //!
-//! Plain Gaussian elimination P A = L U, where P brings the largest entry of what is left of a
-//! column to the diagonal. [`solve_in_place`] solves one small system where it is. For the bases of Lemke's
-//! method [`Lu`] keeps the factors: A·X = R is solved for `STRIP` columns of R at a time, so that a row of
-//! the unknowns stays in registers while the rows that it depends on pass by; then once more for what
-//! R − A X leaves, which takes the error of every column to rounding of its own residual.
+//! Plain Gaussian elimination P A = L U. P brings the largest remaining entry of each column to the diagonal.
+//! [`solve_in_place`] solves one small system in its own memory. [`Lu`] keeps the factors, for the bases of
+//! Lemke's method. It solves A·X = R for `STRIP` columns of R at a time, so that a row of the unknowns stays
+//! in registers while it runs over the rows that it depends on. A second solve for the remainder R − A X
+//! reduces the error of every column to the rounding of its own residual.
 //!
 //! **Source**: Golub and Van Loan 2013 (`golub2013`), §3.4 (pivoting), §3.5.3 (refinement).
-//! **Cost**: 2n³/3 for the factors and 6n² for a column of R, less where entries are zero: multipliers
-//! of zero are skipped, so that unit columns, if they come first, cost next to nothing.
+//! **Cost**: 2n³/3 for the factors and 6n² for a column of R, less where entries are zero: multipliers of
+//! zero are skipped, so unit columns that come first are almost free.
 //!
-//! The library faer was no faster on the bases that occur here, and more than a third of a clean build.
+//! The library faer was no faster on the bases that occur here, and took more than a third of a clean build.
 
 use std::ops::{Index, IndexMut};
 
@@ -19,7 +19,7 @@ const STRIP: usize = 16;
 
 type Strip = [f64; STRIP];
 
-/// A dense matrix, kept by rows.
+/// A dense matrix, stored row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Matrix {
     columns: usize,
@@ -68,8 +68,9 @@ impl IndexMut<(usize, usize)> for Matrix {
     }
 }
 
-/// Replaces a square matrix of `n` columns, by rows, by its factors: U on and above the diagonal, L below. Tells
-/// `exchange` which rows P exchanges, in turn. False if a column leaves no pivot above `floor` that is finite.
+/// Replaces a square matrix of `n` columns, stored row by row, by its factors: U on and above the diagonal, L
+/// below. Calls `exchange` with each pair of rows that P exchanges, in order. False if a column has no finite
+/// pivot above `floor`.
 fn factorize(cells: &mut [f64], n: usize, floor: f64, mut exchange: impl FnMut(usize, usize)) -> bool {
     for k in 0..n {
         let size = |i: usize| cells[i * n + k].abs();
@@ -95,8 +96,9 @@ fn factorize(cells: &mut [f64], n: usize, floor: f64, mut exchange: impl FnMut(u
     true
 }
 
-/// Solves A x = b, allocating nothing: A is `b.len()` squared, by rows, and is overwritten, b becomes x. False if a
-/// pivot is not above `least` times the largest entry of A; then b means nothing.
+/// Solves A x = b without allocations. A has `b.len()` rows and columns, stored row by row, and is
+/// overwritten; b becomes x. False if a pivot is not above `least` times the largest entry of A; b is then
+/// undefined.
 pub fn solve_in_place(a: &mut [f64], b: &mut [f64], least: f64) -> bool {
     let n = b.len();
     let floor = least * a.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -118,12 +120,12 @@ pub struct Lu {
     matrix: Matrix,
     /// U on and above the diagonal, L below; the diagonal of L is 1.
     factors: Matrix,
-    /// Row of A that P makes the i-th.
+    /// The row of A that P moves to place i.
     order: Vec<usize>,
 }
 
 impl Lu {
-    /// Factorizes a square matrix; none if a column leaves no pivot that is finite and not zero.
+    /// Factorizes a square matrix. `None` if a column has no pivot that is finite and not zero.
     pub fn new(matrix: Matrix) -> Option<Self> {
         let n = matrix.columns;
         let mut factors = matrix.clone();
@@ -132,7 +134,7 @@ impl Lu {
         is_regular.then_some(Lu { matrix, factors, order })
     }
 
-    /// X of A X = `right`, with one step of refinement.
+    /// The solution X of A X = `right`, with one step of refinement.
     pub fn solve(&self, right: &Matrix) -> Matrix {
         let n = self.order.len();
         let mut solution = Matrix::zeros(n, right.columns);

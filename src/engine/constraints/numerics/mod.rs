@@ -1,4 +1,4 @@
-//! Pure mathematics: no body, no contact.
+//! Pure mathematics, without bodies or contacts.
 
 pub mod block_lu;
 pub mod cone;

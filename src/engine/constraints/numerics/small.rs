@@ -2,7 +2,8 @@
 
 use crate::engine::lanes::Lanes;
 
-/// The solution of K x = r; by LDLᵀ but for two rows, where one division does. What has no pivot is zero.
+/// The solution of K x = r. By LDLᵀ, except for two rows, which take one division. Unknowns without a
+/// positive pivot are zero.
 #[inline(always)]
 pub fn solve<L: Lanes, const N: usize>(mut k: [[L; N]; N], mut x: [L; N]) -> [L; N] {
     if N == 2 {

@@ -1,57 +1,58 @@
-//! Loads of the points under a body at rest.
+//! Loads of the points that support a body at rest.
 //!
-//! The loads F of the points balance a force f and a torque τ as well as their laws allow: with the columns
-//! (u, r × u/ρ) of the unit normals and tangents u in A, and ρ the radius of gyration,
+//! The loads F of the points balance a force f and a torque τ as far as their laws allow. Let A have the
+//! columns (u, r × u/ρ) for the unit normals and tangents u, where ρ is the radius of gyration. Then
 //!
 //! ```text
 //! least |A F + (f, τ/ρ)|,   F_n ≥ 0,   |F_t| ≤ µ F_n
 //! ```
 //!
-//! which by Gauss's principle of least constraint is how the body moves if it cannot rest: a disc on an incline gets
-//! m g sin θ/3 of friction. Of all such loads the smallest are taken, F = W Aᵀ (A W Aᵀ + ε)⁻¹ b, with the weight of a
-//! friction as large as the load of its point: points with one normal reach their cones together. A first solution finds
-//! which points bear and how they share the load, since those that would pull are left out; a second one has frictions
-//! in proportion to that, cut off at their cones.
+//! By Gauss's principle of least constraint, this is also how the body moves if it cannot rest: a disc on an
+//! incline gets a friction of m g sin θ/3. Of all such loads, the smallest are used:
+//! F = W Aᵀ (A W Aᵀ + ε)⁻¹ b. The weight of a friction is the load of its point, so points with the same normal
+//! reach their cones together. A first solution finds the points that carry load, without those that would pull, and how they
+//! share it. A second one has frictions in proportion to these loads, clamped to their cones.
 //!
-//! Where no loads balance f and τ, the best ones for τ may push up to twice as hard as f, and the body below hands down twice of that
-//! again. In equilibrium their sum is −f. So loads whose sum is longer than f are scaled down to that. By the triangle inequality a
-//! body then hands down no more than the weights of all that it bears.
+//! If no loads balance f and τ, the best ones for τ may push up to twice as hard as f, and the body below
+//! passes on twice that. In equilibrium their sum is −f. So loads with a sum longer than f are scaled down to
+//! the length of f. By the triangle inequality, a body then passes on no more than the weights of everything
+//! that it bears.
 
 use glam::{DMat3, DVec2, DVec3};
 
 /// Added to the diagonal of A Aᵀ, whose entries are of the order of 1.
 const RIDGE: f64 = 1e-6;
 
-/// A point on which a body stands.
+/// A point that supports a body.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Support {
     /// Index of its contact.
     pub contact: u32,
-    /// Which of its points it is.
+    /// Index of the point in its contact.
     pub point: usize,
     /// Unit normal toward the body.
     pub normal: DVec2,
-    /// From the body's center of mass (m).
+    /// Arm from the body's center of mass (m).
     pub arm: DVec2,
     /// Coulomb coefficient (1).
     pub friction: f64,
-    /// Along the normal and along (n_y, −n_x) of it (N).
+    /// Load along the normal, and along its tangent (n_y, −n_x) (N).
     pub load: [f64; 2],
 }
 
 impl Support {
-    /// (n_y, −n_x) of the normal.
+    /// The tangent, (n_y, −n_x) of the normal.
     fn tangent(&self) -> DVec2 {
         -self.normal.perp()
     }
 
-    /// Its force on the body (N).
+    /// Force on the body (N).
     pub fn force(&self) -> DVec2 {
         self.load[0] * self.normal + self.load[1] * self.tangent()
     }
 }
 
-/// Loads `supports` with a force (N) and a torque (N·m) on a body of this radius of gyration (m).
+/// Distributes a force (N) and a torque (N·m) on a body of this radius of gyration (m) over `supports`.
 pub(crate) fn load(supports: &mut [Support], force: DVec2, torque: f64, gyration: f64) {
     let column = |s: &Support, u: DVec2| {
         DVec3::new(u.x, u.y, if gyration > 0.0 { s.arm.perp_dot(u) / gyration } else { 0.0 })
@@ -95,7 +96,8 @@ mod tests {
         (found - expected).abs() < 1e-4 * (1.0 + expected.abs())
     }
 
-    /// A box of half width ½ whose weight of 10 N stands x beside its middle: ½ ± x of it, as levers say.
+    /// A box of half width ½ has its weight of 10 N at x beside its middle: by the lever rule, each corner
+    /// bears ½ ± x of it.
     #[test]
     fn two_corners_share_by_their_levers() {
         for x in [-0.25, 0.0, 0.4] {
@@ -106,7 +108,7 @@ mod tests {
         }
     }
 
-    /// Beyond a corner all of it is on that one.
+    /// If the weight is beyond a corner, this corner bears all of it.
     #[test]
     fn no_corner_pulls() {
         let mut corners = [-0.5, 0.5].map(|arm| point(DVec2::Y, DVec2::new(arm, -0.5), 0.0));
@@ -115,7 +117,8 @@ mod tests {
         assert!(corners[1].load[0] > 9.0);
     }
 
-    /// A disc on an incline rolls: friction is a third of what drives it, or µ times the load if that is less.
+    /// A disc on an incline rolls: friction is a third of the driving force, or µ times the load if that is
+    /// less.
     #[test]
     fn a_disc_on_an_incline_has_a_third_of_its_drive_as_friction() {
         let (sin, cos) = (0.3f64.sin(), 0.3f64.cos());
@@ -128,7 +131,7 @@ mod tests {
         }
     }
 
-    /// Between two frictionless walls at α to the horizontal a disc of 10 N asks each for 10 N/(2 cos α).
+    /// Between two frictionless walls at α to the horizontal, a disc of 10 N loads each with 10 N/(2 cos α).
     #[test]
     fn a_wedge_gets_what_it_asks_for() {
         for (angle, expected) in [(60f64, 10.0), (80.0, 28.794)] {
@@ -139,7 +142,7 @@ mod tests {
         }
     }
 
-    /// A torque that nothing balances asks for more than the force on the body.
+    /// The loads that best fit an unbalanced torque exceed the force on the body.
     #[test]
     fn no_body_hands_down_more_than_it_bears() {
         let corners = [-0.5, 0.5].map(|arm| point(DVec2::Y, DVec2::new(arm, -0.5), 0.6));

@@ -1,4 +1,4 @@
-//! Which contact is in which lane: batches, segments, and the buffer that holds records.
+//! Assignment of contacts to lanes: batches, segments, and the buffer of records.
 
 use crate::engine::constraints::records::features::{Features, Layout, LayoutOf, OppositeKind};
 use crate::engine::constraints::records::order::SweepOrder;
@@ -7,7 +7,7 @@ use crate::engine::lanes::{Block, IndexList, Indices, Lanes, held};
 use std::mem::size_of_val;
 use std::ops::Range;
 
-/// Where a segment comes: what [`Segment`] says of it besides its records.
+/// Attributes of a new [`Segment`] besides its records.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub opposite: OppositeKind,
@@ -16,15 +16,15 @@ pub(crate) struct Place {
     pub disjoint: bool,
 }
 
-/// Constraint records of one width, with the lane each contact has.
+/// Constraint records of one width, and the contact in each lane.
 ///
-/// Lanes without a contact repeat the first contact of their batch, and their rows are the inert one:
-/// whatever is gathered by these indices exists if contacts and rows do.
+/// Lanes without a contact repeat the first contact of their batch and use the inert row. So all indices
+/// are valid if the contacts and rows exist.
 #[derive(Clone, Debug, Default)]
 pub struct Batches {
     width: usize,
     segments: Vec<Segment>,
-    /// `segments` in the order of a sweep, and which of them are run now.
+    /// `segments` in the order of a sweep. Passes run over those in `focus`.
     visits: Vec<Segment>,
     focus: Range<usize>,
     order: SweepOrder,
@@ -33,13 +33,13 @@ pub struct Batches {
     row_b: Indices,
     /// Records, `stride × width` floats each.
     buffer: Vec<Block>,
-    /// Lane vectors in use of the buffer.
+    /// Lane vectors of the buffer that are in use.
     vectors: usize,
-    /// Places in vectors over contact points.
+    /// Slots in vectors over contact points.
     slots: usize,
 }
 
-/// The records of a segment, and by what they gather.
+/// The records of a segment, and the indices by which its lanes gather.
 pub struct SegmentRecords<'a, L> {
     /// `[batches × stride]`
     pub records: &'a mut [L],
@@ -51,17 +51,17 @@ pub struct SegmentRecords<'a, L> {
     pub row_b: IndexList<'a>,
 }
 
-/// The two sets of batches of a step.
+/// The two sets of batches in a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// Colored, at the width of the step.
+    /// Colored batches, at the width of the step.
     Lanes,
-    /// One after the other.
+    /// Batches of contacts that are solved one after the other.
     Serial,
 }
 
 impl Part {
-    /// This one of both.
+    /// Selects the batches of this part.
     pub(crate) fn of<'b>(self, lanes: &'b mut Batches, serial: &'b mut Batches) -> &'b mut Batches {
         match self {
             Part::Lanes => lanes,
@@ -70,7 +70,7 @@ impl Part {
     }
 }
 
-/// Contacts are added by so many at a time, since the bound of a list is found in lanes.
+/// Contacts are appended in chunks of this size, because the bound of an index list is computed in lanes.
 const PART: usize = 64;
 
 impl Batches {
@@ -79,12 +79,12 @@ impl Batches {
         self.width
     }
 
-    /// All segments, as they were pushed.
+    /// All segments, in the order in which they were pushed.
     pub fn segments(&self) -> &[Segment] {
         &self.segments
     }
 
-    /// The segments that a pass runs over, in order: all of them unless [`Self::arrange`] said otherwise.
+    /// Segments that a pass runs over, in order. All of them, unless [`Self::arrange`] selected others.
     pub fn visits(&self) -> &[Segment] {
         &self.visits[self.focus.clone()]
     }
@@ -102,7 +102,7 @@ impl Batches {
         }
     }
 
-    /// Brings what passes run over into an order.
+    /// Sets the order of the segments that passes run over.
     pub fn arrange(&mut self, order: SweepOrder) {
         if order != self.order {
             order.arrange(&self.segments, self.width, &mut self.visits);
@@ -111,17 +111,17 @@ impl Batches {
         self.focus = 0..self.visits.len();
     }
 
-    /// The rank of the first visit after those that passes run over; none if there is no other.
+    /// Rank of the first visit after the focused ones; `None` if there is none.
     pub(crate) fn next_rank(&self) -> Option<u64> {
         self.visits.get(self.focus.end).map(|s| self.order.rank(s.stage))
     }
 
-    /// Makes passes run over nothing; [`Self::focus_on`] goes on from the beginning.
+    /// Makes passes run over nothing. [`Self::focus_on`] then starts from the beginning.
     pub(crate) fn unfocus(&mut self) {
         self.focus = 0..0;
     }
 
-    /// Makes passes run over the visits of this rank that come next.
+    /// Makes passes run over the next visits, as long as they have this rank.
     pub(crate) fn focus_on(&mut self, rank: u64) {
         let start = self.focus.end;
         let of_rank = |s: &&Segment| self.order.rank(s.stage) == rank;
@@ -157,7 +157,7 @@ impl Batches {
         &self.buffer[..self.blocks()]
     }
 
-    /// As [`Self::records`], to write.
+    /// As [`Self::records`], mutable.
     pub fn records_mut(&mut self) -> &mut [Block] {
         let blocks = self.blocks();
         &mut self.buffer[..blocks]
@@ -183,9 +183,9 @@ impl Batches {
         (self.vectors, self.slots) = (0, 0);
     }
 
-    /// Appends one segment of contacts, each with the rows of its a and b, padded to whole
-    /// batches with lanes that point at the `inert` row: a color of a stage of its own, or with one
-    /// lane to a batch contacts that follow each other.
+    /// Appends one segment of contacts, each with the rows of its bodies a and b. Padding lanes point at the
+    /// `inert` row and fill up the last batch. The segment has a stage of its own. It is a color, or with one
+    /// lane per batch a list of contacts to solve one after the other.
     ///
     /// # Panics
     /// If the batches have no width yet ([`Self::clear`]).
@@ -235,7 +235,7 @@ impl Batches {
         self.row_a.fill_to(end, inert);
         self.row_b.fill_to(end, inert);
         let first_vector = self.vectors;
-        // At every width the same place: what is disjoint may be of any width, what is not is of one lane.
+        // The slot does not depend on the width: disjoint segments have any width, the others have one lane.
         let first_slot = if disjoint { self.slots.next_multiple_of(16) } else { self.slots };
         self.slots = first_slot + contacts;
         let segment = Segment {
@@ -256,7 +256,7 @@ impl Batches {
         self.vectors += batches * stride;
     }
 
-    /// Brings segments into the order of their stages; their records stay where they are.
+    /// Sorts segments by their stages; their records stay where they are.
     pub(crate) fn sort_by_stage(&mut self) {
         let is_later = |pair: &[Segment]| pair[0].stage > pair[1].stage;
         if self.segments.windows(2).any(is_later) {
@@ -265,7 +265,7 @@ impl Batches {
         }
     }
 
-    /// Makes room in the buffer for the records of all segments.
+    /// Allocates the buffer for the records of all segments.
     pub fn reserve_buffer(&mut self) {
         let blocks = self.blocks();
         if self.buffer.len() < blocks {
@@ -273,9 +273,9 @@ impl Batches {
         }
     }
 
-    /// Whether these are batches for kernels of `width` lanes, and all their rows and contacts exist.
+    /// Checks that these batches fit kernels of `width` lanes, and that all their rows and contacts exist.
     ///
-    /// Gathers and scatters see to that themselves; this says it before a step has begun.
+    /// Gathers and scatters check this as well. This check runs before the step begins.
     ///
     /// # Panics
     /// If not.
@@ -290,16 +290,16 @@ impl Batches {
         assert!(bound <= contacts, "batches name contact {} of {contacts}", bound - 1);
     }
 
-    /// The records of a segment of these batches for a kernel of as many lanes and of the same layout.
+    /// The records of a segment, for a kernel of the same width and layout.
     ///
     /// # Panics
-    /// If the batches are of another width or layout, or have no buffer ([`Self::reserve_buffer`]).
+    /// If the batches have another width or layout, or no buffer ([`Self::reserve_buffer`]).
     #[inline(always)]
     pub fn records_of<L: Lanes>(&mut self, segment: &Segment, layout: &Layout) -> SegmentRecords<'_, L> {
         self.records_with_stride(segment, layout.stride)
     }
 
-    /// As [`Self::records_of`], for records that are `stride` lane vectors long.
+    /// As [`Self::records_of`], for records of `stride` lane vectors.
     ///
     /// # Panics
     /// As [`Self::records_of`].
@@ -323,7 +323,7 @@ impl Batches {
         }
     }
 
-    /// Groups of sixteen places in vectors over contact points.
+    /// Groups of sixteen slots in vectors over contact points.
     pub(crate) fn groups(&self) -> usize {
         self.slots.div_ceil(16)
     }
@@ -339,7 +339,7 @@ impl Batches {
         4 * (self.vectors * self.width + 2 * self.contact.len() - static_lanes)
     }
 
-    /// Per array, bytes held and bytes in use.
+    /// Bytes held and bytes in use, for each array.
     pub fn memory(&self) -> [(usize, usize); 6] {
         let of = |list: &Indices| (list.held_bytes(), size_of_val::<[u32]>(list));
         [

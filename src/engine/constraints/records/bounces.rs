@@ -1,10 +1,10 @@
-//! Side records for restitution: only scenes in which something bounces have it.
+//! Side records for restitution. Scenes in which nothing bounces have none.
 
 use crate::engine::constraints::records::segment::Segment;
 use crate::engine::lanes::{Block, Lanes, held};
 use std::slice::ChunksExactMut;
 
-/// Side records; what they hold, each law of impacts says ([`crate::engine::constraints::impacts`]).
+/// Side records. The law of impacts defines their contents ([`crate::engine::constraints::impacts`]).
 #[derive(Clone, Debug, Default)]
 pub struct Bounces {
     /// Lane vectors per record.
@@ -24,17 +24,17 @@ impl Bounces {
         records.expect("bounces of these batches: `prepare` makes them").chunks_exact_mut(stride)
     }
 
-    /// Whether there are any.
+    /// Whether there are side records.
     pub(crate) fn are_prepared(&self) -> bool {
         self.stride > 0
     }
 
-    /// There are none any more.
+    /// Discards the side records.
     pub(crate) fn forget(&mut self) {
         self.stride = 0;
     }
 
-    /// Makes room for `lanes` lanes of `stride` vectors per batch.
+    /// Allocates the records of `lanes` lanes, with `stride` lane vectors per batch.
     pub(crate) fn reserve(&mut self, lanes: usize, stride: usize) {
         self.stride = stride;
         self.buffer.resize((lanes * stride).div_ceil(16), Block::default());

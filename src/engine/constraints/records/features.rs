@@ -4,8 +4,8 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Features {
-    /// Some contact can turn a body. Not so when every dynamic body is a disc about
-    /// its own center, nothing spins at the start and there is no friction.
+    /// Some contact can turn a body. False if every dynamic body consists of discs about its center of
+    /// mass, nothing spins at the start and there is no friction.
     pub rotation: bool,
     /// Some pair of surfaces has a friction coefficient above zero.
     pub friction: bool,
@@ -18,15 +18,15 @@ pub struct Features {
 }
 
 impl Features {
-    /// Everything: the kernel for scenes that use all there is.
+    /// All features.
     pub const FULL: Features =
         Features { rotation: true, friction: true, restitution: true, two_points: true, damping: true };
 
-    /// Nothing.
+    /// No features.
     pub const NONE: Features =
         Features { rotation: false, friction: false, restitution: false, two_points: false, damping: false };
 
-    /// The union of two scenes' needs.
+    /// Features of either scene.
     pub fn union(self, other: Features) -> Features {
         Features {
             rotation: self.rotation || other.rotation,
@@ -38,18 +38,18 @@ impl Features {
     }
 }
 
-/// The needs that change the text of a sweep, as compile-time constants.
+/// The features that change the code of a sweep, as compile-time constants.
 ///
-/// Restitution and damping are passes of their own and need no other sweep.
+/// Restitution and damping are passes of their own, so sweeps do not depend on them.
 pub trait KernelFeatures: Copy + 'static {
     /// [`Features::rotation`]
     const ROTATION: bool;
     /// [`Features::friction`]
     const FRICTION: bool;
-    /// 1 or 2: the points of a contact.
+    /// Points of a contact: 1 or 2.
     const POINTS: usize;
 
-    /// The layout of this kernel's records against that kind of body a.
+    /// The layout of this kernel's records for this kind of body a.
     fn layout(opposite: OppositeKind) -> Layout {
         Layout::new(Self::ROTATION, Self::FRICTION, Self::POINTS, opposite != OppositeKind::Static)
     }
@@ -58,7 +58,7 @@ pub trait KernelFeatures: Copy + 'static {
 /// [`KernelFeatures::layout`] as a value.
 pub type LayoutOf = fn(OppositeKind) -> Layout;
 
-/// One kernel's needs.
+/// The features of one kernel, as a type.
 #[derive(Clone, Copy, Debug)]
 pub struct Kernel<const ROTATION: bool, const FRICTION: bool, const POINTS: usize>;
 
@@ -70,12 +70,12 @@ impl<const R: bool, const F: bool, const P: usize> KernelFeatures for Kernel<R, 
 
 /// Kind of body a of a contact; body b is dynamic.
 pub trait Opposite: Copy + 'static {
-    /// Body a has a velocity and a motion: its row is gathered.
+    /// Whether body a can have a velocity and move, so that its row is gathered.
     const HAS_ROW: bool;
 }
 
-/// A body that moves. Whether impulses change that is known per segment ([`OppositeKind`]): a dynamic
-/// body's row is written back, a kinematic one's, with inverse masses of zero, is not.
+/// A moving body. Whether impulses change its velocity is known per segment ([`OppositeKind`]): the row of
+/// a dynamic body is written back; that of a kinematic body, with inverse masses of zero, is not.
 #[derive(Clone, Copy, Debug)]
 pub struct OnMoving;
 /// A static body.
@@ -94,32 +94,31 @@ impl Opposite for OnStatic {
 pub enum OppositeKind {
     /// A dynamic body: impulses change its velocity.
     Dynamic,
-    /// A kinematic body: it moves, but no impulse changes that.
+    /// A kinematic body: it moves, but impulses do not change its velocity.
     Kinematic,
     /// A static body: no row is read or written for it.
     Static,
 }
 
 impl OppositeKind {
-    /// Every kind.
+    /// All kinds.
     pub const ALL: [OppositeKind; 3] = [OppositeKind::Dynamic, OppositeKind::Kinematic, OppositeKind::Static];
 }
 
-/// Where each quantity of a constraint record stands, in lane vectors.
+/// Offset of each quantity in a constraint record, in lane vectors.
 ///
-/// A record is what one batch of `W` contacts keeps: `stride` vectors of `W` floats,
-/// back to back. Quantities that the kernel does not need have no place, so they cost
-/// no bytes. Per contact: normal, friction. Per point: the angular arms `r × n` and
-/// `r × t` of both bodies, separation, effective masses, accumulated impulses.
+/// A record holds one batch of `W` contacts: `stride` vectors of `W` floats, back to back. Quantities that
+/// the kernel does not use are not stored. Per contact: normal, friction. Per point: the angular arms
+/// `r × n` and `r × t` of both bodies, separation, effective masses, accumulated impulses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
     /// Points per contact.
     pub points: usize,
     /// Friction coefficient.
     pub friction: usize,
-    /// First point; the normal stands at 0 and 1.
+    /// First point. The normal is at 0 and 1.
     pub first_point: usize,
-    /// From one point to the next.
+    /// Distance from one point to the next.
     pub point_stride: usize,
     /// Within a point: `r_b × n`, then `r_b × t`.
     pub arm_b: usize,
@@ -137,16 +136,16 @@ pub struct Layout {
     pub tangent_impulse: usize,
     /// Vectors in a record.
     pub stride: usize,
-    /// Whether the tangential quantities have a place.
+    /// Whether the tangential quantities are stored.
     pub has_friction: bool,
-    /// Whether the arms have a place, of body b and of body a.
+    /// Whether the arms of body b, and those of body a, are stored.
     pub has_arms: [bool; 2],
-    /// Whether body a has a row that is gathered.
+    /// Whether body a has a row to gather.
     pub a_has_row: bool,
 }
 
 impl Layout {
-    /// The layout for these needs against this kind of body a.
+    /// The layout for these features. `a_has_row`: body a has a row to gather.
     pub const fn new(rotation: bool, friction: bool, points: usize, a_has_row: bool) -> Layout {
         let arm_b = 0;
         let arm_a = if rotation { 2 } else { 0 };
@@ -181,24 +180,24 @@ impl Layout {
         Layout::new(N::ROTATION, N::FRICTION, N::POINTS, O::HAS_ROW)
     }
 
-    /// The layout for values instead of types.
+    /// The layout for features that are known at run time.
     pub fn for_features(features: &Features, opposite: OppositeKind) -> Layout {
         let points = if features.two_points { 2 } else { 1 };
         Layout::new(features.rotation, features.friction, points, opposite != OppositeKind::Static)
     }
 
-    /// Floats of a point's arms.
+    /// Number of floats for the arms of a point.
     pub fn arms(&self) -> usize {
         2 * self.has_arms.iter().filter(|&&has| has).count()
     }
 
-    /// Where a quantity of point `p` stands.
+    /// Offset of a quantity of point `p`.
     #[inline(always)]
     pub const fn at(&self, p: usize, quantity: usize) -> usize {
         self.first_point + p * self.point_stride + quantity
     }
 
-    /// Bytes per contact: the record's share and the body indices.
+    /// Bytes per contact: its share of the record, and the body indices.
     pub const fn bytes(&self, opposite: OppositeKind) -> usize {
         4 * self.stride + if matches!(opposite, OppositeKind::Static) { 4 } else { 8 }
     }

@@ -2,14 +2,14 @@
 //!
 //! For solvers that go from body to body (block descent on bodies) or from the ground upward
 //! (shock propagation). Built only for a solver that requests it, in time linear in contacts.
-//! Edges are numbered as contacts are; nothing here knows what an edge is.
+//! Edges have the numbers of their contacts. The graph does not depend on what an edge stands for.
 
 use crate::engine::lanes::held;
 
-/// Distance from the ground of a body that no chain of contacts connects with it.
+/// Level of a body that no chain of contacts connects to the ground.
 pub const UNSUPPORTED: u32 = u32::MAX;
 
-/// Which edges each body has; keeps its memory from step to step.
+/// The edges of each body; keeps its memory from step to step.
 #[derive(Clone, Debug, Default)]
 pub struct Graph {
     ends: Vec<[u32; 2]>,
@@ -18,13 +18,13 @@ pub struct Graph {
     edges: Vec<u32>,
     levels: Vec<u32>,
     queue: Vec<u32>,
-    /// Constraints of each body that are no edges. `[bodies]`
+    /// Number of constraints on each body that are not edges. `[bodies]`
     others: Vec<u32>,
 }
 
 impl Graph {
-    /// Builds the graph of `edges`, given by their two bodies; what is not below `bodies` is the
-    /// world, which has no edges of its own. `is_dynamic` tells which bodies are carried by others.
+    /// Builds the graph of `edges`, given as pairs of bodies. A number that is not below `bodies` is the
+    /// world, which has no edges of its own. Bodies that are not dynamic are ground, at level 0.
     pub fn build(
         &mut self,
         bodies: usize,
@@ -55,7 +55,7 @@ impl Graph {
         self.find_levels(bodies, known, is_dynamic);
     }
 
-    /// Breadth-first search from everything that does not move by contacts.
+    /// Breadth-first search from everything that contacts do not move.
     fn find_levels(&mut self, bodies: usize, known: impl Fn(&u32) -> bool, is_dynamic: impl Fn(u32) -> bool) {
         self.levels.clear();
         self.levels.resize(bodies, UNSUPPORTED);
@@ -87,7 +87,7 @@ impl Graph {
         }
     }
 
-    /// Counts constraints that are no edges by their two bodies, after [`Self::build`].
+    /// Counts the constraints that are not edges, given as pairs of bodies. Called after [`Self::build`].
     pub(crate) fn count_others(&mut self, ends: impl Iterator<Item = [u32; 2]>) {
         self.others.clear();
         self.others.resize(self.levels.len(), 0);
@@ -98,7 +98,7 @@ impl Graph {
         }
     }
 
-    /// Constraints on a body: its edges, and what is none.
+    /// Number of constraints on a body, including those that are not edges.
     pub fn constraints_of(&self, body: usize) -> usize {
         self.edges_of(body).len() + self.others.get(body).map_or(0, |&count| count as usize)
     }
@@ -123,13 +123,13 @@ impl Graph {
         self.ends[edge]
     }
 
-    /// Edges between each body and the nearest one that is not dynamic: 0 for that one itself,
-    /// [`UNSUPPORTED`] without a connection. `[bodies]`
+    /// Number of edges between each body and the nearest body that is not dynamic: 0 for the latter,
+    /// [`UNSUPPORTED`] if they are not connected. `[bodies]`
     pub fn levels(&self) -> &[u32] {
         &self.levels
     }
 
-    /// Bodies that a chain of contacts connects with the ground, the nearest first.
+    /// Bodies that a chain of contacts connects to the ground, nearest first.
     pub fn upwards(&self) -> &[u32] {
         &self.queue
     }
@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn a_tower_a_free_pair_and_a_body_alone() {
-        // 0 is the ground; 1 on 0, 2 on 1, 3 on 1 and on 2; 4 and 5 touch in the air; 6 alone.
+        // 0 is the ground; 1 on 0, 2 on 1, 3 on 1 and on 2; 4 and 5 touch in the air; 6 is alone.
         let edges = [[0, 1], [1, 2], [1, 3], [2, 3], [4, 5]];
         let mut graph = Graph::default();
         for _ in 0..2 {

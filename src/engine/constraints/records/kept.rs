@@ -1,13 +1,13 @@
 //! Numbers that a solver keeps from step to step, per contact, per contact point and per body.
 //!
-//! Multipliers, penalties, rest lengths: what they mean is the solver's affair. A contact point
-//! is recognized by its shape pair and its feature id, as its impulses are; a new one starts with
-//! zeros. Solvers that keep nothing have empty arrays, and nothing is looked up for them.
+//! The solver defines what they mean: multipliers, penalties, rest lengths. A contact point is recognized by
+//! its shape pair and its feature id, as for its impulses. A new point starts with zeros. Solvers that keep
+//! nothing have empty arrays and cost no look-ups.
 
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{LaneVec, held};
 
-/// Numbers that a solver keeps from step to step.
+/// How many numbers a solver keeps from step to step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct KeptSize {
@@ -20,16 +20,16 @@ pub struct KeptSize {
 }
 
 impl KeptSize {
-    /// Nothing.
+    /// Nothing is kept.
     pub const NONE: KeptSize = KeptSize { per_contact: 0, per_point: 0, per_body: 0 };
 }
 
-/// The numbers; see the [module](self).
+/// The kept numbers; see the [module](self).
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Kept {
     size: KeptSize,
-    /// Shape pair and feature ids of each contact that the numbers belong to.
+    /// Shape pair and feature ids of each contact, by which its numbers are found again.
     names: Vec<(u64, [u32; 2])>,
     /// `[contacts × per_contact]`
     contacts: LaneVec,
@@ -45,7 +45,7 @@ pub struct Kept {
     last_points: LaneVec,
 }
 
-/// The feature id of a point that is not in use: no contact has it.
+/// Feature id of a point that is not in use. No contact has it.
 const UNUSED: u32 = u32::MAX;
 
 impl Kept {
@@ -87,13 +87,13 @@ impl Kept {
         &mut self.bodies[body * size..][..size]
     }
 
-    /// Whether the numbers are as many as their names say, as they may not be after they were read from a file.
+    /// Whether the arrays of contacts and points have the right lengths. Data from a file may not.
     pub fn is_consistent(&self) -> bool {
         let (KeptSize { per_contact, per_point, .. }, contacts) = (self.size, self.names.len());
         self.points.len() == 2 * contacts * per_point && self.contacts.len() == contacts * per_contact
     }
 
-    /// Sets what is kept of body `body` to zero: another one has taken its place.
+    /// Sets the numbers of body `body` to zero. For a body that takes the index of a removed one.
     pub fn forget_body(&mut self, body: usize) {
         let size = self.size.per_body;
         if let Some(own) = self.bodies.get_mut(body * size..(body + 1) * size) {
@@ -101,12 +101,14 @@ impl Kept {
         }
     }
 
-    /// All numbers of contact points, `[2 × contacts × per_point]`, first points of all contacts before second ones.
+    /// All numbers of contact points, `[2 × contacts × per_point]`: first points of all contacts, then second
+    /// ones.
     pub fn points(&mut self) -> &mut [f32] {
         &mut self.points
     }
 
-    /// The numbers of all first and of all second points, `[contacts × per_point]` each, for gathers by contact.
+    /// Numbers of all first points and of all second points, `[contacts × per_point]` each, to gather by
+    /// contact.
     pub fn by_point(&mut self) -> [&mut [f32]; 2] {
         let seconds = self.points.len() / 2;
         self.points.split_at_mut(seconds).into()
@@ -119,15 +121,15 @@ impl Kept {
         names + lists.map(LaneVec::bytes).iter().sum::<usize>() + held(&self.bodies)
     }
 
-    /// Takes the numbers on to the contacts of the coming step, which are sorted by shape pair. `changed`: contacts may have
-    /// come or gone since the last call.
+    /// Assigns the numbers to the contacts of the coming step, which are sorted by shape pair. `changed`:
+    /// contacts may have come or gone since the last call.
     pub fn follow(&mut self, size: KeptSize, contacts: &[Contact], bodies: usize, changed: bool) {
         if size != self.size {
             *self = Kept { size, ..Kept::default() };
         }
         self.bodies.resize(bodies * size.per_body, 0.0);
         let is_same = !changed && self.names.len() == contacts.len();
-        // Points may be others in the same contact.
+        // The points of a contact may have changed even then.
         if size.per_point == 0 && (size.per_contact == 0 || is_same) {
             return;
         }
@@ -190,15 +192,15 @@ mod tests {
         kept.point(0, 1)[0] = 9.0;
         kept.point(1, 0)[0] = 1.0;
         kept.body(2).copy_from_slice(&[7.0, 8.0]);
-        // A new pair in front; the points of 0-2 exchanged; 1-2 gone and 1-3 come.
+        // A new pair in front; the points of 0-2 swapped; 1-2 removed and 1-3 added.
         kept.follow(size, &[contact([0, 1], &[0]), contact([0, 2], &[9, 5]), contact([1, 3], &[0])], 4, true);
         assert_eq!(kept.points(), [0.0, 9.0, 0.0, 0.0, 5.0, 0.0]);
         assert_eq!(kept.contacts(), [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 12.0, 0.0, 0.0, 0.0, 0.0]);
         assert_eq!([kept.body(2), &mut [0.0, 0.0]], [&[7.0, 8.0], &[0.0, 0.0]]);
-        // Another feature of the same pair is another point.
+        // Another feature of the same pair is a new point.
         kept.follow(size, &[contact([0, 2], &[9, 6])], 4, false);
         assert_eq!(kept.points(), [9.0, 0.0]);
-        // Another solver, other numbers.
+        // Another solver keeps other numbers.
         kept.follow(KeptSize::default(), &[contact([0, 2], &[9, 6])], 4, false);
         assert!(kept.points().is_empty());
     }

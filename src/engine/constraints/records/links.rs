@@ -4,63 +4,63 @@ use crate::engine::lanes::held;
 use bytemuck::Pod;
 use wide::f32x8;
 
-/// Links that are worked on together: the same at any width of the step.
+/// Links per group. Independent of the width of the step.
 pub const LINK_LANES: usize = 8;
 
-/// A joint that is a link.
+/// A joint that is a link of a chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChainLink {
-    /// Its number in its type.
+    /// Its index among the joints of its type.
     pub joint: u32,
     /// Group and lane: [`LINK_LANES`] times the group, plus the lane.
     pub slot: u32,
-    /// The second of the joint's ends is the body away from where the chain hangs.
+    /// Whether the second of the joint's ends is body R, the one away from where the chain hangs.
     pub forward: bool,
 }
 
-/// How errors of links are removed.
+/// How the errors of links are corrected.
 #[derive(Clone, Copy, Debug)]
 pub struct LinkRule {
-    /// 1/h (1/s); 0 if errors are left.
+    /// 1/h (1/s); 0 if errors are not corrected.
     pub inv_h: f32,
     /// Size of typical bodies (m).
     pub length_unit: f32,
 }
 
-/// Numbers of links, group by group: so many lane vectors each.
+/// Numbers of links: `stride` lane vectors per group.
 #[derive(Clone, Debug, Default)]
 pub struct LinkGroups<V> {
     stride: usize,
     values: Vec<V>,
 }
 
-/// The rows of all links: of each row `[d_x, d_y, s_L, s_R, b]`, then `[m_L⁻¹, m_R⁻¹, I_L⁻¹, I_R⁻¹]`. The right side b = −(J v + C/h)
-/// in m/s or rad/s. Of a lane without a link all is 0.
+/// Rows of all links. `[d_x, d_y, s_L, s_R, b]` per row, then `[m_L⁻¹, m_R⁻¹, I_L⁻¹, I_R⁻¹]` per link. The
+/// right side is b = −(J v + C/h) in m/s or rad/s. Lanes without a link are 0.
 pub type LinkRows = LinkGroups<f32x8>;
 
 /// Impulses of all links, one lane vector per row (N·s or N·m·s).
 pub type LinkImpulses = LinkGroups<f32x8>;
 
 impl<V: Pod> LinkGroups<V> {
-    /// Zeros, `stride` of them in each of so many groups.
+    /// Sets the numbers of `groups` groups, `stride` each, to zero.
     pub fn begin(&mut self, stride: usize, groups: usize) {
         self.stride = stride;
         self.values.clear();
         self.values.resize(groups * stride, V::zeroed());
     }
 
-    /// Sets all to zero.
+    /// Sets all numbers to zero.
     pub fn clear(&mut self) {
         self.values.fill(V::zeroed());
     }
 
-    /// Of a group. `[stride]`
+    /// The numbers of a group. `[stride]`
     #[inline(always)]
     pub fn group(&self, group: usize) -> &[V] {
         &self.values[group * self.stride..][..self.stride]
     }
 
-    /// As [`Self::group`].
+    /// As [`Self::group`], mutable.
     #[inline(always)]
     pub fn group_mut(&mut self, group: usize) -> &mut [V] {
         &mut self.values[group * self.stride..][..self.stride]
@@ -73,7 +73,7 @@ impl<V: Pod> LinkGroups<V> {
 }
 
 impl LinkImpulses {
-    /// Adds to a group.
+    /// Adds `more` to the impulses of a group.
     #[inline(always)]
     pub fn add(&mut self, group: usize, more: &[f32x8]) {
         self.group_mut(group).iter_mut().zip(more).for_each(|(sum, &more)| *sum += more);

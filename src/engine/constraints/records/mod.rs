@@ -1,8 +1,9 @@
 //! Records: where each number of each constraint is stored.
 //!
-//! [`features`] says which numbers a scene needs and where a record keeps them, [`batches`] and [`segment`] how records
-//! follow each other, and [`order`] in which order a sweep visits them. [`rows`] are
-//! those of joints, one by one, and [`links`] those of chains of joints. [`graph`], [`kept`], [`bounces`] and [`point_vector`] hold what some solvers store beside the records.
+//! [`features`] defines which numbers a scene needs and where a record stores them. [`batches`] and
+//! [`segment`] define how records follow each other, and [`order`] the order in which a sweep visits them.
+//! [`rows`] holds single rows of joints, and [`links`] those of chains of joints. [`graph`], [`kept`],
+//! [`bounces`] and [`point_vector`] hold what some solvers store beside the records.
 
 pub mod batches;
 #[doc(hidden)]

@@ -1,30 +1,30 @@
-//! In which order a sweep visits contacts.
+//! The order in which a sweep visits contacts.
 //!
-//! Within a color no two contacts share a body that they push, so only the order of colors
-//! matters, and a color that is visited k times in a row is k local iterations of each of its
-//! contacts. What is solved one after the other is visited contact by contact. Nothing here depends
-//! on the width, and kernels know nothing of it: they run over the segments that they are given.
+//! Within a color, no two contacts push the same body, so only the order of colors matters. A color that is
+//! visited k times in a row gets k local iterations of each of its contacts. Serial contacts are visited one
+//! by one. The order does not depend on the width. Kernels do not depend on the order: they run over the
+//! segments that they are given.
 
 use crate::engine::constraints::records::segment::Segment;
 
-/// In which order a sweep visits contacts.
+/// The order in which a sweep visits contacts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SweepOrder {
-    /// As they were assigned: color by color, then the serial ones.
+    /// As assigned: color by color, then the serial contacts.
     #[default]
     Forward,
-    /// The other way round.
+    /// The reverse of [`Self::Forward`].
     Reverse,
-    /// In an order drawn from this seed.
+    /// A random order with this seed.
     Random(u64),
-    /// Forward, every contact so many times before the next one.
+    /// Forward, with this many visits of each contact before the next one.
     Local(u32),
     /// Forward, only the contacts of this level ([`Segment::level`]).
     Level(u32),
 }
 
 impl SweepOrder {
-    /// Where a stage comes: lower ranks first.
+    /// Sort key of a stage: lower ranks come first.
     pub(crate) fn rank(self, stage: u32) -> u64 {
         match self {
             SweepOrder::Reverse => u64::from(u32::MAX - stage),
@@ -33,10 +33,10 @@ impl SweepOrder {
         }
     }
 
-    /// Lists in `visits` what to run of the segments of batches of `width` lanes.
+    /// Lists in `visits` what a pass runs over, given the segments of batches of `width` lanes.
     pub(crate) fn arrange(self, segments: &[Segment], width: usize, visits: &mut Vec<Segment>) {
         visits.clear();
-        // One contact at a time, where contacts of a segment may share bodies.
+        // Contacts of a segment that may share bodies are visited one at a time.
         let serial = segments.iter().filter(|s| !s.disjoint);
         let single = |s: &Segment| {
             let s = *s;
@@ -70,7 +70,7 @@ impl SweepOrder {
     }
 }
 
-/// Bits of `x` mixed: the finalizer of SplitMix64 (Steele, Lea & Flood 2014).
+/// `x` with its bits mixed: the finalizer of SplitMix64 (Steele, Lea & Flood 2014).
 pub(crate) fn mixed(x: u64) -> u64 {
     let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

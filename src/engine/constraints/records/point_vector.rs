@@ -1,19 +1,22 @@
-//! Vectors over contact points in the order of the lanes: what is done entry by entry is done in lanes.
+//! Vectors over contact points in lane order, so that arithmetic on their entries runs in lanes.
 //!
-//! Sixteen contacts that follow each other in a segment share four blocks: λn of their first points, λt of
-//! those, then the same of their second points. A segment of colored batches begins with blocks of its own,
-//! whatever the width, and so a contact has one place at every width; contacts in natural order follow each
-//! other without gaps. Places without a point are zero. Sums are kept in sixteen parts, one for each place
-//! within a block, in `f64` and in the order of the blocks, and the parts are added in order: the
-//! result has the same bits at every width. Behind the contacts come constraints of other types, if the scene has any: a
-//! row of sixteen of them has two blocks, the second of which is zero. For arithmetic entry by entry the width does not
-//! matter, so it is always [`Wide`], which a build lowers to what it has.
+//! Sixteen contacts in a row in a segment share four blocks: λn of their first points, λt of their first
+//! points, then the same of their second points. Each segment of colored batches starts with a new block,
+//! whatever the width, so a contact has the same slot at every width. Contacts in natural order follow each
+//! other without gaps. Slots without a point are zero.
+//!
+//! Sums are kept in `f64` in sixteen parts, one for each slot within a block, in the order of the blocks.
+//! Then the parts are added in order. So the result has the same bits at every width.
+//!
+//! Constraints of other types, if the scene has any, come after the contacts: a row of sixteen of them has
+//! two blocks, the second of which is zero. Arithmetic on single entries does not depend on the width, so it
+//! always uses [`Wide`], which a build lowers to the instructions that it has.
 
 use crate::engine::constraints::records::batches::Batches;
 use crate::engine::lanes::{Block, Lanes, held};
 use wide::f32x16;
 
-/// Lanes of entry-by-entry arithmetic.
+/// Lanes for arithmetic on single entries.
 pub type Wide = f32x16;
 
 /// Sixteen points: their normal and their tangential entries.
@@ -30,7 +33,7 @@ impl Clone for PointVector {
         PointVector { blocks: self.blocks.clone() }
     }
 
-    /// Into the memory that there is.
+    /// Reuses the memory of `self`.
     fn clone_from(&mut self, from: &Self) {
         self.blocks.clone_from(&from.blocks);
     }
@@ -40,19 +43,19 @@ impl Clone for PointVector {
 const SHARED: usize = 4;
 
 impl PointVector {
-    /// Zeros for the contacts of both sets of batches and for `rows` of sixteen other constraints.
+    /// Sets zeros for the contacts of both sets of batches and for `rows` rows of sixteen other constraints.
     pub(crate) fn reset(&mut self, batches: [&Batches; 2], rows: usize) {
         self.blocks.clear();
         let contacts = SHARED * batches.map(Batches::groups).iter().sum::<usize>();
         self.blocks.resize(contacts + 2 * rows, Block::default());
     }
 
-    /// What is behind the contacts of both sets of batches.
+    /// Entries of other constraints, which come after the contacts of both sets of batches.
     pub(crate) fn others(&mut self, batches: [&Batches; 2]) -> &mut [Block] {
         &mut self.blocks[SHARED * batches.map(Batches::groups).iter().sum::<usize>()..]
     }
 
-    /// The parts that belong to the contacts of either set of batches.
+    /// Entries of the contacts of each set of batches.
     pub(crate) fn parts(&mut self, batches: [&Batches; 2]) -> [&mut [Block]; 2] {
         let [lanes, serial] = batches.map(Batches::groups);
         assert!(self.blocks.len() >= SHARED * (lanes + serial), "a vector of other contacts");
@@ -84,8 +87,8 @@ impl PointVector {
     }
 }
 
-/// Where lane vector `[normal, tangential]` of point `point` is, in lane vectors of a part, of the batch that begins
-/// at place `slot` of its set of batches.
+/// Indices of the lane vectors `[normal, tangential]` of point `point`, for the batch that begins at slot
+/// `slot`. In lane vectors, within the entries of its set of batches.
 #[inline(always)]
 pub(crate) fn places<L: Lanes>(slot: usize, point: usize) -> [usize; 2] {
     let per_block = 16 / L::WIDTH;
@@ -93,7 +96,7 @@ pub(crate) fn places<L: Lanes>(slot: usize, point: usize) -> [usize; 2] {
     [first, first + per_block]
 }
 
-/// Replaces every entry of `to` by what `f` makes of the old ones and of those of `from`.
+/// Replaces every entry of `to` by the result of `f`, given the entries of `to` and of `from`.
 ///
 /// # Panics
 /// If a vector is shorter than the first.
@@ -125,7 +128,7 @@ pub fn energy(x: &PointVector, y: &PointVector, masses: Option<&PointVector>) ->
     }
 }
 
-/// Sum over all entries of the product of the two that `f` makes of those of `from`.
+/// Sum over all entries of the product of the two results of `f`, given the entries of `from`.
 ///
 /// # Panics
 /// If a vector is shorter than the first.
@@ -173,7 +176,7 @@ pub fn plus_scaled(x: PointEntry, factor: f32, y: PointEntry) -> PointEntry {
     sum(x, scaled(factor, y))
 }
 
-/// The same, entry by entry, of `x / y` where y > 0, and 0 elsewhere.
+/// `x / y` where y > 0, and 0 elsewhere, entry by entry.
 #[inline(always)]
 pub fn quotient(x: PointEntry, y: PointEntry) -> PointEntry {
     [0, 1].map(|axis| Lanes::select_positive(y[axis], x[axis] / y[axis], Wide::zero()))

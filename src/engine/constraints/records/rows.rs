@@ -1,6 +1,6 @@
-//! Rows of constraints as numbers: the Jacobian of an error, the law of a block, and a block by itself.
+//! Rows of constraints as numbers: the Jacobian of an error, the law of a block, and one block of one joint.
 //!
-//! What they mean is derived in `constraints/joints/rows.rs`.
+//! They are derived in `constraints/joints/rows.rs`.
 
 use crate::engine::constraints::numerics::small::solve;
 use crate::engine::lanes::Lanes;
@@ -37,13 +37,13 @@ impl<L: Lanes> Jacobian<L> {
         ]
     }
 
-    /// The first value where the error is a length, the second where it is an angle.
+    /// `of_length` where the error is a length, `of_angle` where it is an angle.
     #[inline(always)]
     pub fn select(&self, of_length: L, of_angle: L) -> L {
         self.axis[0].mul_add(self.axis[0], self.axis[1] * self.axis[1]).select_positive(of_length, of_angle)
     }
 
-    /// The same row, the other way round: −C.
+    /// The row of the negative error, −C.
     #[inline(always)]
     pub fn reversed(self) -> Self {
         Jacobian { axis: self.axis.map(|x| -x), arms: self.arms.map(|x| -x) }
@@ -64,7 +64,7 @@ pub enum RowLaw<L> {
         /// F h
         cap: L,
     },
-    /// A spring; behind the impulses of its rows stand as many errors.
+    /// A spring. The errors of its rows are stored after their impulses.
     Spring {
         /// S (1/s)
         stiffness: L,
@@ -75,12 +75,12 @@ pub enum RowLaw<L> {
     },
 }
 
-/// One block of one joint as bodies are now, for methods that are no sweeps.
+/// One block of one joint at the present state of its bodies, for solvers that do not use sweeps.
 #[derive(Clone, Copy, Debug)]
 pub struct RowBlock {
-    /// a and b.
+    /// Bodies a and b.
     pub bodies: [u32; 2],
-    /// Rows of it.
+    /// Number of rows.
     pub size: usize,
     /// J. `[size]`
     pub jacobians: [Jacobian<f32>; ROWS],
@@ -90,7 +90,7 @@ pub struct RowBlock {
     pub errors: [f32; ROWS],
     /// J times the displacements since the start of the step (m or rad). `[size]`
     pub travel: [f32; ROWS],
-    /// Of all its rows.
+    /// The law of the block.
     pub law: RowLaw<f32>,
     /// λ (N·s or N·m·s). `[size]`
     pub impulses: [f32; ROWS],
@@ -98,7 +98,7 @@ pub struct RowBlock {
     pub reach: [f32; 2],
 }
 
-/// Rows of the largest block.
+/// Number of rows of the largest block.
 pub const ROWS: usize = 3;
 
 /// r × d
@@ -111,7 +111,7 @@ impl RowBlock {
     /// K⁻¹ x
     pub fn solved(&self, x: [f32; ROWS]) -> [f32; ROWS] {
         let mut k = self.response;
-        // Rows that are not there have no part.
+        // Unused rows become rows of the identity.
         (self.size..ROWS).for_each(|i| k[i][i] = 1.0);
         solve(k, x)
     }

@@ -1,4 +1,4 @@
-//! Which constraint goes to which lane: by colors, or one after the other.
+//! Assignment of constraints to lanes: by colors, or one after the other.
 
 use super::Workspace;
 use crate::engine::coloring::{Coloring, EXEMPT};
@@ -9,61 +9,61 @@ use crate::engine::constraints::records::order::mixed;
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{LaneWidth, held};
 
-/// One constraint on its way into a lane.
+/// A constraint that gets a lane.
 #[derive(Clone, Copy, Debug)]
 struct Assigned {
-    /// Level of the contact graph; 0 unless they are grouped by it.
+    /// Level in the contact graph; 0 unless constraints are grouped by level.
     level: u32,
-    /// 0 for contacts, k for type k − 1 of [`Workspace::types`].
+    /// Type: 0 for contacts, k for type k − 1 of [`Workspace::types`].
     kind: u32,
     index: u32,
-    /// Rows of a and b.
+    /// Rows of bodies a and b.
     rows: [u32; 2],
 }
 
 impl Assigned {
-    /// Entries of one segment have this in common.
+    /// Key that all entries of a segment share.
     fn place(&self) -> (u32, u32) {
         (self.level, self.kind)
     }
 }
 
-/// Constraints against one kind of body, and their colors.
+/// Constraints with one kind of body a, and their colors.
 #[derive(Clone, Debug, Default)]
 struct Group {
     entries: Vec<Assigned>,
-    /// Their rows, with a exempt unless it is dynamic.
+    /// Rows of their bodies. a is exempt unless it is dynamic.
     edges: Vec<[u32; 2]>,
     coloring: Coloring,
 }
 
-/// Gives constraints their lanes; keeps its memory from call to call.
+/// Assigns lanes to constraints; keeps its memory from call to call.
 #[derive(Clone, Debug, Default)]
 pub struct Assignment {
-    /// By [`OppositeKind`].
+    /// One group per [`OppositeKind`].
     groups: [Group; 3],
     /// Entries of one color.
     color: Vec<Assigned>,
     /// Contacts in a shuffled order.
     places: Vec<u32>,
-    /// Colors in use.
+    /// Number of colors in use.
     pub colors: usize,
-    /// Constraints that got no color and are solved one by one.
+    /// Number of constraints that got no color and are solved one by one.
     pub overflow: usize,
 }
 
 /// Inputs of the assignment of lanes.
 pub struct Sides<'a, F> {
-    /// Number of bodies; the row of this number is the inert one.
+    /// Number of bodies. The row with this index is the inert one.
     pub bodies: usize,
-    /// The kind of the other body of a contact of the dynamic body b, given body a.
+    /// Kind of body a. The other body of the constraint, b, is dynamic.
     pub opposite: F,
-    /// Where contacts are grouped by level, the graph that has the levels.
+    /// The graph by whose levels contacts are grouped, if they are.
     pub levels: Option<&'a Graph>,
 }
 
 impl<F> Sides<'_, F> {
-    /// A contact's level: that of its upper body; 0 for contacts without support.
+    /// Level of a contact: the higher one of its two bodies; 0 for contacts without support.
     fn level(&self, rows: [u32; 2]) -> u32 {
         let Some(graph) = self.levels else { return 0 };
         let of = |body: u32| graph.levels().get(body as usize).copied().unwrap_or(0);
@@ -72,10 +72,10 @@ impl<F> Sides<'_, F> {
     }
 }
 
-/// Cost of a batch's arithmetic, if that of gathering one of its lanes is 1.
+/// Cost of a batch's arithmetic, relative to the cost of gathering one lane.
 const BATCH_COST: usize = 12;
 
-/// Colors of all groups are fewer than this.
+/// Upper bound of the number of colors of all groups.
 const STAGES_PER_LEVEL: u32 = 256;
 
 impl Assignment {
@@ -85,13 +85,13 @@ impl Assignment {
         self.groups.iter().map(one).sum::<usize>() + held(&self.color)
     }
 
-    /// Forgets all colors, so that the next call recomputes them even for the same contacts.
+    /// Discards all colors, so that the next call recomputes them even for the same contacts.
     pub fn forget(&mut self) {
         self.groups.iter_mut().for_each(|group| group.coloring.forget());
     }
 
-    /// Lanes color by color, as many as pay and the two `widths` allow; what gets no color goes one after
-    /// the other.
+    /// Assigns lanes color by color, at the cheapest width within the two `widths`. Constraints without a
+    /// color are solved one after the other.
     pub fn colored(
         &mut self,
         work: &mut Workspace,
@@ -147,9 +147,8 @@ impl Assignment {
         work.finish_lanes();
     }
 
-    /// The width of the cheapest sweep. A batch of W lanes costs about 12 + W: its arithmetic, which is
-    /// the same at every width, and its lanes, which are gathered one by one (measured on piles of 5 to 180
-    /// contacts).
+    /// The width of the cheapest sweep. A batch of W lanes costs about 12 + W: its arithmetic costs the same
+    /// at every width, and its lanes are gathered one by one (measured on piles of 5 to 180 contacts).
     fn fitting(&self, [narrowest, widest]: [LaneWidth; 2]) -> LaneWidth {
         let cost = |width: LaneWidth| {
             let slots: usize = self.groups.iter().map(|g| g.coloring.lane_slots(width.lanes())).sum();
@@ -159,7 +158,7 @@ impl Assignment {
         allowed.min_by_key(|&w| cost(w)).unwrap_or(widest)
     }
 
-    /// One after the other, by a hash of their shapes.
+    /// Assigns contacts one after the other, ordered by a hash of their shapes.
     pub fn shuffled(
         &mut self,
         work: &mut Workspace,
@@ -179,7 +178,7 @@ impl Assignment {
         self.places = places;
     }
 
-    /// One after the other, in `order`, after the constraints of other types.
+    /// Assigns contacts one after the other, in `order`, after the constraints of other types.
     pub fn serial(
         &mut self,
         work: &mut Workspace,

@@ -8,13 +8,13 @@ use crate::engine::constraints::records::graph::Graph;
 use crate::engine::lanes::BodyRow;
 
 impl Passes<'_> {
-    /// How long a body moves with the velocity of [`Self::integrate_velocities`] (s): h, or 0 where it has
-    /// moved before (explicit Euler).
+    /// Time for which bodies move with the velocities of [`Self::integrate_velocities`] (s): h, or 0 if they
+    /// have moved before (explicit Euler).
     pub fn motion_after_velocities(&self) -> f32 {
         self.work.motion.after_velocities()
     }
 
-    /// Body pass of the solver's own, on the rows and on what moves them, booked on `phase`.
+    /// Runs a body pass of the solver's own, on the rows and on their motion, booked on `phase`.
     pub fn over_bodies(&mut self, phase: Phase, pass: impl FnOnce(&mut Vec<BodyRow>, &mut Motion)) {
         if self.input.phases.runs(phase) {
             pass(&mut self.work.rows, &mut self.work.motion);
@@ -28,13 +28,13 @@ impl Passes<'_> {
         self.over_bodies(Phase::Integrate, |rows, motion| motion.integrate_velocities(rows));
     }
 
-    /// Body pass: as [`Self::integrate_velocities`] and a warm start in one, valid from
-    /// the second substep on (see [`Motion::extrapolate_velocities`]).
+    /// Body pass: [`Self::integrate_velocities`] and a warm start in one. Valid from the second substep on
+    /// (see [`Motion::extrapolate_velocities`]).
     pub fn integrate_and_warm_start(&mut self) {
         if self.work.types.is_empty() {
             self.over_bodies(Phase::Integrate, |rows, motion| motion.extrapolate_velocities(rows));
         } else {
-            // Arms of joints have turned.
+            // Arms of joints have turned, so the last change of velocities is not a warm start.
             self.integrate_velocities();
             self.warm_start();
         }
@@ -45,12 +45,12 @@ impl Passes<'_> {
         self.over_bodies(Phase::Integrate, |rows, motion| motion.integrate_positions(rows));
     }
 
-    /// Body pass: takes the turns of round bodies out of their rows, as moving them by velocities does.
+    /// Body pass: takes the turns of round bodies out of their rows, as the integration of positions does.
     pub fn hide_turns(&mut self) {
         self.over_bodies(Phase::Integrate, |rows, motion| motion.hide_turns(rows));
     }
 
-    /// Finds out which constraints each body has.
+    /// Builds the contact graph, and counts the other constraints of each body.
     pub fn build_graph(&mut self, graph: &mut Graph) {
         let bodies = self.work.rows.len() - 1;
         let dynamic = |body: u32| self.work.rows[body as usize].velocity[3] > 0.0;
@@ -58,7 +58,7 @@ impl Passes<'_> {
         graph.count_others(self.work.types.iter().flat_map(|t| t.kind.ends()).copied());
     }
 
-    /// As [`Self::build_graph`]; constraints of other types are edges as well, behind the contacts.
+    /// As [`Self::build_graph`], but constraints of other types are edges as well, after the contacts.
     pub fn build_whole_graph(&mut self, graph: &mut Graph) {
         let bodies = self.work.rows.len() - 1;
         let dynamic = |body: u32| self.work.rows[body as usize].velocity[3] > 0.0;
@@ -70,9 +70,9 @@ impl Passes<'_> {
         );
     }
 
-    /// Multiplies inverse masses and inertias by `factor(body)`, from what they are without
-    /// any, and lets the effective masses of the constraints follow that the order has. Until
-    /// [`Self::restore_masses`] a Jacobi sweep takes a factor n for n copies of a body.
+    /// Scales inverse masses and inertias by `factor(body)`, relative to their unscaled values, and
+    /// recomputes the effective masses of the constraints in the present order. Until
+    /// [`Self::restore_masses`], a Jacobi sweep treats a factor n as n copies of a body.
     pub fn scale_masses(&mut self, phase: Phase, masses: &mut ScaledMasses, factor: impl Fn(usize) -> f32) {
         if !self.input.phases.runs(phase) {
             return;
@@ -83,7 +83,7 @@ impl Passes<'_> {
         self.clock.lap(phase);
     }
 
-    /// Ends what [`Self::scale_masses`] began.
+    /// Ends the scaling by [`Self::scale_masses`].
     pub fn restore_masses(&mut self, phase: Phase, masses: &mut ScaledMasses) {
         self.scale_masses(phase, masses, |_| 1.0);
         if self.input.phases.runs(phase) {

@@ -1,5 +1,5 @@
-//! How far contact points have drifted since they began to stick: what a solver keeps from step to step whose friction holds
-//! places, see `kernels/velocity/sticky.rs`.
+//! How far contact points have drifted since they began to stick. Kept from step to step by solvers whose
+//! friction holds points at their places; see `kernels/velocity/sticky.rs`.
 
 use super::{Passes, StepParts, Workspace};
 use crate::engine::clock::Phase;
@@ -7,15 +7,15 @@ use crate::engine::constraints::kernels::velocity::sticky::{BookDrift, LoadDrift
 use crate::engine::constraints::kernels::velocity::sweep::ContactLaw;
 use crate::engine::constraints::records::point_vector::PointVector;
 
-/// Drifts within a step; between steps they are in [`super::Passes::kept`], one float per contact point.
+/// Drifts within a step. Between steps they are in [`super::Passes::kept`], one float per contact point.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Drifts {
-    /// How far each point has drifted before the step (m), in the order of the lanes.
+    /// Drift of each point before the step (m), in lane order.
     vector: PointVector,
 }
 
 impl Drifts {
-    /// Brings drifts into the order of the lanes, once a step and before all sweeps.
+    /// Brings drifts into lane order. Called once per step, before all sweeps.
     pub fn load(&mut self, passes: &mut Passes<'_>) {
         if passes.runs(Phase::Prepare) {
             self.vector.clear();
@@ -28,7 +28,7 @@ impl Drifts {
         }
     }
 
-    /// A sweep, without what bounces.
+    /// One sweep, without the rows of points that bounce.
     pub fn sweep(&mut self, passes: &mut Passes<'_>, phase: Phase, sticky: Sticky) {
         let drifts = passes.parts_of(&mut self.vector);
         if passes.run(phase, &mut StickySweep { sticky, drifts }) {
@@ -36,13 +36,13 @@ impl Drifts {
         }
     }
 
-    /// A sweep, and one over what bounces, which solves the law of `law`.
+    /// One sweep, and one over the rows of points that bounce. `law` is the law that they solve.
     pub fn sweep_by(&mut self, passes: &mut Passes<'_>, phase: Phase, sticky: Sticky, law: &dyn ContactLaw) {
         let drifts = passes.parts_of(&mut self.vector);
         passes.sweep_by(phase, &mut StickySweep { sticky, drifts }, law);
     }
 
-    /// Keeps the drifts of a step that ends, of points within `reach` (m).
+    /// Keeps the drifts at the end of a step, of points within `reach` (m).
     pub fn book(&mut self, passes: &mut Passes<'_>, reach: f32) {
         if passes.rows_per_point() == 2 {
             let drifts = passes.parts_of(&mut self.vector);

@@ -1,4 +1,4 @@
-//! What bounces, and the impulses of a step.
+//! Impacts, and the impulses of a step.
 
 use super::{Passes, Workspace};
 use crate::engine::clock::Phase;
@@ -10,22 +10,22 @@ use crate::engine::constraints::records::batches::Part;
 use crate::engine::constraints::records::bounces::Bounces;
 use crate::engine::params::RESTITUTION_THRESHOLD;
 
-/// How impacts spread, see [`spread`].
+/// How impacts spread; see [`spread`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Spreading<'a> {
-    /// Bodies are where they were hit, else where they are.
+    /// Whether bodies bounce at the time of their impact instead of the beginning of the step.
     pub timed: bool,
-    /// What does not bounce stops, but for contacts of these bodies, which also stay where they are (`[bodies]`, or empty);
-    /// none: nothing stops.
+    /// If set, points that do not bounce are stopped, except those of these bodies, which also stay where
+    /// they are (`[bodies]`, or empty). If `None`, nothing is stopped.
     pub stops: Option<&'a [bool]>,
-    /// Points that an impact releases have borne their body until then.
+    /// Whether to apply the loads that points carried until an impact released them.
     pub releases: bool,
-    /// Most visits for each of the first points of an island; [`VISITS`] where time does not matter.
+    /// Limit of visits for each of the first points of an island; [`VISITS`] where time does not matter.
     pub visits: usize,
 }
 
 impl Passes<'_> {
-    /// Lets what comes in bounce or stop, before the step.
+    /// Lets approaching points bounce or stop, before the step.
     pub(crate) fn spread_impacts(&mut self, spreading: Spreading<'_>) {
         let Spreading { timed, stops, releases, visits } = spreading;
         let (h, dt, slop) = (self.h(), self.dt(), self.slop());
@@ -68,7 +68,7 @@ impl Passes<'_> {
         self.work.impacts.spread = spread;
     }
 
-    /// Treatment of impacts before the step.
+    /// Handles impacts before the step.
     pub(super) fn begin_impacts(&mut self) {
         self.work.impacts.bounces.iter_mut().for_each(Bounces::forget);
         (self.bounces, self.biased) = (false, false);
@@ -85,17 +85,17 @@ impl Passes<'_> {
         }
     }
 
-    /// The law of impacts of the run.
+    /// The impact law of the run.
     pub(crate) fn impacts(&self) -> ImpactLaw {
         self.input.impacts
     }
 
-    /// As [`Self::impacts`]; none where nothing bounces.
+    /// As [`Self::impacts`], but `None` if nothing bounces.
     pub(crate) fn law(&self) -> ImpactLaw {
         if self.input.features.restitution { self.input.impacts } else { ImpactLaw::None }
     }
 
-    /// Notes how fast points come in that shall bounce at the end of the step.
+    /// Notes the approach speeds of points that are to bounce at the end of the step.
     fn begin_bounces(&mut self, rebound: Rebound) {
         let points = if self.input.features.two_points { 2 } else { 1 };
         let stride = self.law().stride(points);
@@ -104,15 +104,15 @@ impl Passes<'_> {
         self.bounces = begin.found > 0.0;
     }
 
-    /// Finds what bounces in the whole step, for solvers whose impulses add up over its substeps: a rebound is to
-    /// stay one until the end. They call [`Self::bounce`] for the last substep alone.
+    /// Finds the points that bounce during the whole step. For solvers whose impulses add up over its
+    /// substeps: a rebound must last until the end. They call [`Self::bounce`] for the last substep alone.
     pub(crate) fn find_bounces_of_step(&mut self) {
         if self.law() == ImpactLaw::Bias && self.input.phases.runs(Phase::Prepare) {
             self.begin_bias(false, self.dt());
         }
     }
 
-    /// Finds what bounces within `h` (s).
+    /// Finds the points that bounce within `h` (s).
     fn begin_bias(&mut self, is_first: bool, h: f32) {
         let slowest = RESTITUTION_THRESHOLD * self.length_unit();
         let mut begin = bias::FindBounces { h, is_first, slowest, fastest: 0.0 };
@@ -120,7 +120,7 @@ impl Passes<'_> {
         self.biased = begin.fastest > 0.0;
     }
 
-    /// Solves rows that bounce, after a sweep over the others.
+    /// Solves the rows of points that bounce, after a sweep over the others.
     pub(super) fn sweep_bias(&mut self, phase: Phase) {
         if self.biased && self.input.phases.runs(phase) {
             self.over_contacts(&mut bias::BiasSweep);
@@ -128,7 +128,7 @@ impl Passes<'_> {
         }
     }
 
-    /// Ends substep `substep`: bounces if it is the last, and books impulses where asked.
+    /// Ends substep `substep`: bounces if it is the last, and books impulses if they are recorded.
     pub fn end_substep(&mut self, substep: u32) {
         self.bounce(substep);
         self.book_impulses();

@@ -1,7 +1,7 @@
-//! A step's problem, prepared: passes over bodies and over constraints, which a solver calls in its own order.
+//! The prepared problem of a step: passes over bodies and constraints, which a solver calls in its own order.
 //!
-//! [`Passes`] is all that a solver sees. Its methods are in files by what they work on: `bodies`, `sweeps`,
-//! `impacts` and `vectors`; here is what runs a pass.
+//! [`Passes`] is the whole interface of a solver. Its methods are in files by what they work on: `bodies`,
+//! `sweeps`, `impacts` and `vectors`. This file runs the passes.
 
 #[doc(hidden)]
 pub mod assign;
@@ -36,9 +36,9 @@ use crate::engine::params::{Budget, MAX_POSITION_CORRECTION, MAX_PUSH_SPEED};
 
 /// One step's problem, prepared.
 ///
-/// Each method is one pass over all bodies or all constraints. Colored batches run
-/// first, color by color; then the serial ones. Nothing here is generic: passes are
-/// compiled per width and features, schedules once.
+/// Each method is one pass over all bodies or all constraints. Colored batches run first, color by color;
+/// then the serial ones. This type is not generic: passes are compiled per width and features, schedules
+/// once.
 pub struct Passes<'a> {
     work: &'a mut Workspace,
     contacts: &'a mut [Contact],
@@ -48,11 +48,11 @@ pub struct Passes<'a> {
     count: WorkCount,
     iterations: u32,
     order: SweepOrder,
-    /// Something may bounce at the end of the step.
+    /// Whether something may bounce at the end of the step.
     bounces: bool,
-    /// Rows ask for rebounds.
+    /// Whether rows have rebound speeds as targets.
     biased: bool,
-    /// Springs and motors of joints have acted in this substep.
+    /// Whether springs and motors of joints have acted in this substep.
     driven: bool,
 }
 
@@ -64,7 +64,7 @@ pub struct StepParts<'p> {
     pub contacts: &'p mut [Contact],
     /// Inputs of the step.
     pub input: &'p StepInput,
-    /// Books what they read and write.
+    /// Books the time of passes, and the bytes that they read and write.
     pub clock: &'p mut Clock,
     /// Lanes of the colored batches.
     pub width: LaneWidth,
@@ -83,7 +83,7 @@ impl<'a> Passes<'a> {
         width: LaneWidth,
     ) -> Self {
         let (count, order) = (WorkCount::default(), SweepOrder::Forward);
-        // A phase that is repeated finds the side records of the step before it.
+        // A phase that is repeated alone uses the side records of the step before.
         let are_prepared = work.impacts.bounces[0].are_prepared();
         let (bounces, biased) = (are_prepared, are_prepared);
         let mut passes = Passes {
@@ -102,7 +102,7 @@ impl<'a> Passes<'a> {
         passes.bounces &= passes.law() != ImpactLaw::Bias;
         passes.biased &= passes.law() == ImpactLaw::Bias;
         passes.set_order(SweepOrder::Forward);
-        // A phase that is repeated finds the records, and the check, of the step before it.
+        // A phase that is repeated alone uses the records of the step before, which have been checked.
         if passes.input.phases.runs(Phase::Prepare) {
             for (batches, width) in [(&passes.work.lanes, width.lanes()), (&passes.work.serial, 1)] {
                 batches.assert_fits(width, passes.work.rows.len(), passes.contacts.len());
@@ -114,7 +114,7 @@ impl<'a> Passes<'a> {
         passes
     }
 
-    /// Work allowed.
+    /// Work allowed per step.
     pub fn budget(&self) -> Budget {
         self.input.budget
     }
@@ -134,17 +134,17 @@ impl<'a> Passes<'a> {
         self.input.length_unit
     }
 
-    /// Overlap that position correction leaves alone (m).
+    /// Overlap that position correction leaves uncorrected (m).
     pub fn slop(&self) -> f32 {
         Margins::of(self.input.length_unit).slop
     }
 
-    /// Fastest speed at which Baumgarte stabilization pushes overlap apart (m/s).
+    /// Speed limit for pushing overlap apart by Baumgarte stabilization (m/s).
     pub fn push_speed(&self) -> f32 {
         MAX_PUSH_SPEED * self.input.length_unit
     }
 
-    /// Largest overlap that one position sweep removes at a point (m), and largest angle (rad).
+    /// Largest correction in one position sweep: overlap at a point (m), and angle (rad).
     pub fn max_correction(&self) -> [f32; 2] {
         [self.input.length_unit, 1.0].map(|unit| MAX_POSITION_CORRECTION * unit)
     }
@@ -154,22 +154,22 @@ impl<'a> Passes<'a> {
         self.input.parameters[index]
     }
 
-    /// Whether the solver's mechanism of this index in `Variant::mechanisms` is at work.
+    /// Whether the solver's mechanism of this index in `Variant::mechanisms` is active.
     pub fn has(&self, mechanism: usize) -> bool {
         !self.input.without.leaves_out(mechanism)
     }
 
-    /// Points of all contacts.
+    /// Number of points of all contacts.
     pub fn points(&self) -> usize {
         self.input.points
     }
 
-    /// Numbers that the solver keeps per contact, contact point and body, see `Variant::kept`.
+    /// Numbers that the solver keeps per contact, contact point and body; see `Variant::kept`.
     pub fn kept(&mut self) -> &mut Kept {
         &mut self.work.kept
     }
 
-    /// Everything that a pass may work on, for solvers with passes of their own.
+    /// Data for a solver's own passes over bodies and contacts.
     pub fn parts(&mut self) -> StepParts<'_> {
         StepParts {
             work: self.work,
@@ -180,14 +180,13 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// Whether `phase` runs: in a step every one, else the one that is repeated alone.
+    /// Whether `phase` runs: always in a full step; otherwise only the phase that is repeated alone.
     pub fn runs(&self, phase: Phase) -> bool {
         self.input.phases.runs(phase)
     }
 
-    /// Constraint pass of the solver's own, booked on `phase`; returns whether it ran, which it
-    /// does not while another phase is repeated alone. What solves rows is counted by
-    /// [`Self::count_sweep`].
+    /// Runs a constraint pass of the solver's own, booked on `phase`. Returns false if it did not run because
+    /// another phase is repeated alone. Passes that solve rows are counted by [`Self::count_sweep`].
     pub fn run(&mut self, phase: Phase, pass: &mut dyn AnyPass) -> bool {
         if !self.input.phases.runs(phase) {
             return false;
@@ -196,7 +195,7 @@ impl<'a> Passes<'a> {
             return true;
         }
         if matches!(phase, Phase::Prepare | Phase::Store) {
-            // Other types have their records already.
+            // Constraints of other types have their records already.
             self.over_contacts(pass);
         } else {
             self.over_batches(phase, pass);
@@ -205,7 +204,7 @@ impl<'a> Passes<'a> {
         true
     }
 
-    /// The order of the passes that follow, until the next call or the end of the step.
+    /// Sets the order of the passes that follow, until the next call or the end of the step.
     pub fn set_order(&mut self, order: SweepOrder) {
         let Workspace { lanes, serial, types, .. } = &mut *self.work;
         lanes.arrange(order);
@@ -214,13 +213,13 @@ impl<'a> Passes<'a> {
         self.order = order;
     }
 
-    /// Levels of the contact graph: 1 unless the solver groups contacts by them.
+    /// Number of levels in the contact graph: 1 unless the solver groups contacts by them.
     pub fn levels(&self) -> u32 {
         let segments = self.work.lanes.segments().iter().chain(self.work.serial.segments());
         1 + segments.map(|s| s.level).max().unwrap_or(0)
     }
 
-    /// Ends an iteration, in the solver's own sense of the word.
+    /// Ends an iteration, as the solver defines it.
     pub fn iteration_done(&mut self) {
         self.iterations += 1;
         if let Some(mut watch) = self.work.watch.take() {
@@ -236,17 +235,17 @@ impl<'a> Passes<'a> {
         self.count.row_updates += rows_per_point * self.input.points;
     }
 
-    /// Counts a substep that is too large for the solver's own method, so that sweeps alone solve it.
+    /// Counts a substep that was too large for the solver's own method and was solved by sweeps alone.
     pub fn count_unsolved(&mut self) {
         self.count.unsolved += 1;
     }
 
-    /// Rows that a sweep with friction solves at a contact point.
+    /// Rows that a sweep with friction solves at each contact point.
     pub fn rows_per_point(&self) -> usize {
         if self.input.features.friction { 2 } else { 1 }
     }
 
-    /// Writes accumulated impulses back to the contacts; returns what was done.
+    /// Writes accumulated impulses back to the contacts, and returns the work done.
     pub fn finish(mut self) -> WorkCount {
         self.set_order(SweepOrder::Forward);
         if self.input.phases.runs(Phase::Store) {
@@ -258,8 +257,8 @@ impl<'a> Passes<'a> {
         self.count
     }
 
-    /// Colored batches at the width of the step, then serial ones at one lane; in reverse order the
-    /// other way round. Constraints of other types take part.
+    /// Runs over the colored batches at the width of the step, then over the serial ones at one lane. In
+    /// reverse order, the serial ones come first. Includes constraints of other types.
     fn over_batches(&mut self, phase: Phase, pass: &mut dyn AnyPass) {
         let passes_by = is_sweep(phase) || phase == Phase::Store;
         if self.work.types.is_empty() || passes_by && self.types_are_idle() {
@@ -282,12 +281,12 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// Whether sweeps have nothing to do: there are no contacts, and all rows of other types are those of links.
+    /// Whether sweeps have nothing to do: there are no contacts, and all rows of other types belong to links.
     fn has_no_sweeps(&self) -> bool {
         self.contacts.is_empty() && self.types_are_idle()
     }
 
-    /// Whether all rows of other types are those of links.
+    /// Whether all rows of other types belong to links.
     fn types_are_idle(&self) -> bool {
         self.work.types.iter().all(|joined| joined.kind.is_idle())
     }
@@ -299,7 +298,7 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// Constraints of other types that come at this rank.
+    /// Runs over the constraints of other types with this rank.
     fn over_types(&mut self, phase: Phase, pass: &mut dyn AnyPass, part: Part, rank: u64) {
         let (width, mode, law, driven) = (self.width_of(part), pass.mode_of(), pass.law_of(), self.driven);
         let Workspace { rows, types, poses, .. } = &mut *self.work;
@@ -327,7 +326,7 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// Constraints of other types, without the contacts.
+    /// Runs over the constraints of other types, without the contacts.
     pub(super) fn over_types_alone(&mut self, phase: Phase, mode: PassMode) {
         let Workspace { rows, types, poses, .. } = &mut *self.work;
         let (h, counted, driven) = (self.input.h, self.input.phases.counted, self.driven);
@@ -374,14 +373,14 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// Batches of every type of constraint.
+    /// Batches of all types of constraints.
     fn all(&mut self, part: Part) -> impl Iterator<Item = &mut Batches> {
         let Workspace { lanes, serial, types, .. } = &mut *self.work;
         let types = types.iter_mut().map(move |t| part.of(&mut t.lanes, &mut t.serial));
         types.chain([part.of(lanes, serial)])
     }
 
-    /// Books bytes read and written of each row.
+    /// Books the bytes read and written per body row.
     pub fn book_rows(&mut self, bytes: [f64; 2]) {
         let rows = self.work.rows.len() as f64;
         self.clock.book_bytes(bytes.map(|b| rows * b));
@@ -391,12 +390,13 @@ impl<'a> Passes<'a> {
 /// Bytes of a body's row.
 const ROW: f64 = size_of::<BodyRow>() as f64;
 
-/// Whether impulses are solved or applied.
+/// Whether the phase solves or applies impulses.
 fn is_sweep(phase: Phase) -> bool {
     matches!(phase, Phase::WarmStart | Phase::Solve | Phase::Relax | Phase::Position)
 }
 
-/// Bytes that a sweep over the constraints of a type reads and writes: records and impulses, three indices, both bodies.
+/// Bytes that a sweep over the constraints of a type reads and writes: records and impulses, three indices,
+/// both bodies.
 fn type_traffic(kind: &dyn ConstraintType, batches: &Batches) -> [f64; 2] {
     let mut sums = [0.0; 2];
     for segment in batches.visits() {

@@ -1,4 +1,4 @@
-//! A solver at work: its schedule, and what it does around collision.
+//! The interface of solvers: their schedule, and their hooks around collision.
 
 use super::Passes;
 use crate::engine::bodies::Bodies;
@@ -12,18 +12,20 @@ use crate::engine::params::{Parameters, Without};
 use glam::Vec2;
 use std::fmt;
 
-/// A solver at work in one world: its schedule, and what it keeps from step to step.
+/// A solver in one world: its schedule, and the data that it keeps from step to step.
 ///
-/// A world calls the hooks in the order in which they are listed. Most solvers are a schedule and nothing else:
-/// [`Schedule`].
+/// The world calls the hooks in the order in which they are listed. Most solvers are a [`Schedule`] and
+/// nothing else.
 pub trait Solver: fmt::Debug + Send {
-    /// Before candidates are collided: the contacts are those of the last step.
+    /// Called before candidates are collided. The contacts are those of the last step.
     fn before_collision(&mut self, _scene: &mut CollisionScene<'_>, _collision: &mut Collision) {}
 
-    /// After they were, and impulses were handed on: the contacts are those of the coming step.
+    /// Called after the collision, when impulses have been transferred. The contacts are those of the coming
+    /// step.
     fn after_collision(&mut self, _scene: &mut CollisionScene<'_>) {}
 
-    /// The contact graph, where contacts are to be grouped by its levels; asked before they get their lanes.
+    /// The contact graph, if contacts are to be grouped by its levels. Called before contacts get their
+    /// lanes.
     fn levels(&mut self, _bodies: &Bodies, _contacts: &[Contact]) -> Option<&Graph> {
         None
     }
@@ -31,7 +33,7 @@ pub trait Solver: fmt::Debug + Send {
     /// All passes of one step.
     fn step(&mut self, passes: &mut Passes<'_>);
 
-    /// A copy with all that it keeps.
+    /// A copy of the solver, with all data that it keeps.
     fn boxed(&self) -> Box<dyn Solver>;
 
     /// Bytes held.
@@ -46,11 +48,11 @@ impl Clone for Box<dyn Solver> {
     }
 }
 
-/// The part of a world that a solver sees around a collision.
+/// The part of a world that a solver can access around a collision.
 pub struct CollisionScene<'a> {
-    /// At the beginning of the step.
+    /// Bodies at the beginning of the step.
     pub bodies: &'a Bodies,
-    /// Sorted by shape pair.
+    /// Contacts, sorted by shape pair.
     pub contacts: &'a mut [Contact],
     /// Numbers that the solver keeps per contact, contact point and body, in the order of `contacts`.
     pub kept: &'a mut Kept,
@@ -58,21 +60,21 @@ pub struct CollisionScene<'a> {
     pub types: &'a [Joined],
     /// Pairs of shapes that may touch.
     pub candidates: Candidates<'a>,
-    /// Contacts have come or gone since contacts got their lanes; known after the collision.
+    /// Whether contacts have come or gone since they got their lanes. Valid after the collision.
     pub contacts_changed: bool,
-    /// Steps taken.
+    /// Number of steps taken.
     pub step_index: u64,
     /// The solver's own parameters.
     pub parameters: Parameters,
     /// Mechanisms of the solver that are left out.
     pub without: Without,
-    /// m/s²
+    /// Gravity (m/s²).
     pub gravity: Vec2,
     /// Step (s).
     pub dt: f32,
     /// Size of typical bodies (m).
     pub length_unit: f32,
-    /// Substeps in it.
+    /// Substeps per step.
     pub substeps: u32,
 }
 
@@ -83,16 +85,16 @@ impl CollisionScene<'_> {
     }
 }
 
-/// Requests of a solver to the next collision phase.
+/// A solver's requests for the next collision phase.
 #[derive(Clone, Debug, Default)]
 pub struct Collision {
-    /// By candidate, whether its manifold is left as it is; empty if all are found again.
+    /// For each candidate, whether its manifold is left as it is. Empty if all are recomputed.
     pub keep: Vec<bool>,
-    /// Which contacts roll, if radii of curvature are to be found ([`Contact::radii`]).
+    /// Which contacts roll. `None` if no radii of curvature are needed ([`Contact::radii`]).
     pub rolling: Option<Rolling>,
 }
 
-/// A solver that is a schedule and keeps nothing.
+/// A solver that consists of a schedule and keeps nothing.
 #[derive(Clone, Copy)]
 pub struct Schedule(pub fn(&mut Passes<'_>));
 

@@ -27,8 +27,9 @@ impl Passes<'_> {
         self.clock.lap(Phase::Prepare);
     }
 
-    /// Pass over joints alone: their impulses begin at zero, and springs and motors act. For solvers that move bodies
-    /// before they solve: a spring's law is one of velocities that have not moved bodies yet.
+    /// Pass over joints alone: resets their impulses to zero, then applies springs and motors. For solvers
+    /// that move bodies before they solve: the law of a spring is for velocities that have not moved bodies
+    /// yet.
     pub fn drive_joints(&mut self) {
         if !self.work.types.is_empty() && self.input.phases.runs(Phase::Solve) {
             self.over_types_alone(Phase::Prepare, PassMode::Forget);
@@ -38,8 +39,8 @@ impl Passes<'_> {
         }
     }
 
-    /// Pass over joints alone: books their impulses, which begin at zero again. For solvers whose contacts add up their
-    /// impulses over a step that has several substeps.
+    /// Pass over joints alone: books their impulses and resets them to zero. For solvers whose contacts sum
+    /// up their impulses over a step of several substeps.
     pub fn restart_joints(&mut self) {
         if !self.work.types.is_empty() && self.input.phases.runs(Phase::Solve) {
             if self.input.record_impulses {
@@ -50,8 +51,8 @@ impl Passes<'_> {
         }
     }
 
-    /// Finds the joints that [`Self::solve_chains`] solves, which other passes leave alone until the step ends, and the masses that
-    /// contacts of their bodies have until [`Self::leave_chains`].
+    /// Finds the joints for [`Self::solve_chains`]. Other passes skip their rigid rows until the step ends.
+    /// Also finds the masses of their bodies for contacts, which apply until [`Self::leave_chains`].
     pub fn find_chains(&mut self, chains: &mut Chains) {
         if self.work.types.is_empty() {
             return;
@@ -70,22 +71,23 @@ impl Passes<'_> {
         }
     }
 
-    /// Body pass: bodies of chains have their own masses again.
+    /// Body pass: restores the masses of bodies of chains.
     pub fn leave_chains(&mut self, chains: &mut Chains) {
         chains.restore_masses(&mut self.work.rows);
     }
 
-    /// Body pass: notes velocities of chains. For before warm starts, which change them by the masses of contacts.
+    /// Body pass: notes the velocities of chains. Called before warm starts, which change them by the masses
+    /// for contacts.
     pub fn note_chains(&mut self, chains: &mut Chains) {
         if self.input.phases.runs(Phase::WarmStart) {
             chains.note(&self.work.rows);
         }
     }
 
-    /// Pass over joints alone: solves the rigid rows of chains of joints at once.
+    /// Pass over joints alone: solves the rigid rows of each chain of joints at once.
     pub fn solve_chains(&mut self, chains: &mut Chains, stage: ChainStage) {
         let phase = if stage == ChainStage::Relax { Phase::Relax } else { Phase::Solve };
-        // Nothing has moved them since.
+        // No sweep has moved the bodies since.
         let is_done = stage != ChainStage::Begin && self.has_no_sweeps();
         if self.has_chains(chains) && self.input.phases.runs(phase) && !is_done {
             let Workspace { rows, types, .. } = &mut *self.work;
@@ -97,7 +99,8 @@ impl Passes<'_> {
         }
     }
 
-    /// Pass over joints alone: joints of chains take over their impulses, of the last substep or of any if they are recorded.
+    /// Pass over joints alone: joints of chains take over the impulses of the last substep, or of every
+    /// substep if impulses are recorded.
     pub fn keep_chains(&mut self, chains: &Chains, is_last: bool) {
         if (is_last || self.input.record_impulses)
             && self.has_chains(chains)
@@ -105,7 +108,7 @@ impl Passes<'_> {
         {
             chains.give_impulses(&mut self.work.types);
             if self.input.record_impulses {
-                // Types of the caller's own take it for what it is to them, storing.
+                // Types defined by the caller treat this pass as a normal store.
                 self.over_types_alone(Phase::Store, PassMode::TakeUp);
             }
             self.clock.lap(Phase::Relax);
@@ -116,7 +119,7 @@ impl Passes<'_> {
         !chains.is_empty() && !self.work.types.is_empty()
     }
 
-    /// Pass over joints alone: their records take up what [`ConstraintType::replace`] has changed.
+    /// Pass over joints alone: their records take up the changes by [`ConstraintType::replace`].
     ///
     /// [`ConstraintType::replace`]: crate::engine::constraints::kernels::types::ConstraintType::replace
     pub fn reload_types(&mut self) {
@@ -141,7 +144,7 @@ impl Passes<'_> {
         self.velocity_sweep(phase, { *rule }.sweep());
     }
 
-    /// As [`Self::sweep`], under a rule of the solver's own.
+    /// As [`Self::sweep`], with the solver's own rule.
     pub fn velocity_sweep(&mut self, phase: Phase, sweep: &mut dyn VelocitySweep) {
         if self.run(phase, sweep) {
             self.sweep_bias(phase);
@@ -160,7 +163,7 @@ impl Passes<'_> {
         self.sweep_by(phase, &mut BlockSweep::<_, true>(rule), &Sweep(rule));
     }
 
-    /// Constraint pass: one velocity sweep by a pass of the solver's own, which solves the law of `law`.
+    /// Constraint pass: one velocity sweep with the solver's own pass. `law` is the law that it solves.
     pub fn sweep_by(&mut self, phase: Phase, pass: &mut dyn AnyPass, law: &dyn ContactLaw) {
         if self.run(phase, pass) {
             self.sweep_bias(phase);
@@ -168,8 +171,8 @@ impl Passes<'_> {
         }
     }
 
-    /// Constraint pass: every contact reads the velocities from before the pass, and what all of
-    /// them add to a body, times `relaxation`, is summed up in `sums`; see
+    /// Constraint pass: every contact reads the velocities from before the pass. The changes of each body,
+    /// times `relaxation`, are summed up in `sums`; see
     /// [`crate::engine::constraints::kernels::velocity::jacobi`]. `split`: bodies that are split into copies.
     pub fn jacobi_sweep(
         &mut self,
@@ -191,8 +194,8 @@ impl Passes<'_> {
         self.solved(&Sweep(rule));
     }
 
-    /// Constraint pass: as [`Self::sweep`], on velocities that only move bodies apart; the law of the
-    /// solver is that of its other sweeps.
+    /// Constraint pass: as [`Self::sweep`], on velocities that only move bodies apart. The observed law
+    /// remains that of the solver's other sweeps.
     pub fn push_sweep(&mut self, phase: Phase, rule: &Rule) {
         let mut rule = *rule;
         let sweep = rule.sweep();
@@ -209,7 +212,7 @@ impl Passes<'_> {
         }
     }
 
-    /// Says which law was solved, where no sweep did: this one.
+    /// Sets the observed law, for solvers that solve it without a sweep.
     pub fn solves(&mut self, law: &dyn ContactLaw) {
         if self.work.observe {
             self.work.last_rule = Some(ObservedRule::of(law, &self.work.rows));

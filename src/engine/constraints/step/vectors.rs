@@ -1,4 +1,4 @@
-//! The step's problem as vectors.
+//! The problem of a step as vectors.
 
 use super::{Passes, Workspace};
 use crate::engine::clock::Phase;
@@ -8,7 +8,7 @@ use crate::engine::constraints::vectors::system::{Others, System};
 use crate::engine::lanes::Block;
 
 impl Passes<'_> {
-    /// All impulses and velocities as vectors, in an order that no width changes.
+    /// All impulses and velocities as vectors, in an order that does not depend on the width.
     pub fn system(&mut self) -> System<'_> {
         let Workspace { rows, lanes, serial, types, poses, .. } = &mut *self.work;
         let (h, counted) = (self.input.h, self.input.phases.counted);
@@ -24,14 +24,14 @@ impl Passes<'_> {
         )
     }
 
-    /// The greatest violation of the rigid contact law now (N·s), see [`System::residual`].
+    /// Largest violation of the rigid contact law at present (N·s); see [`System::residual`].
     pub fn residual(&mut self) -> f64 {
         let h = self.h();
         self.system().residual(h)
     }
 
-    /// A vector over contact points, all zero. Given back by [`Self::give_back`], it is not allocated
-    /// again in the next step.
+    /// A vector over contact points, all zero. Returning it by [`Self::give_back`] saves an allocation in the
+    /// next step.
     pub fn vector(&mut self) -> PointVector {
         let mut vector = self.work.vectors.pop().unwrap_or_default();
         let rows = self.work.types.iter().map(Joined::vector_rows).sum();
@@ -39,7 +39,7 @@ impl Passes<'_> {
         vector
     }
 
-    /// What of a vector belongs to the colored and to the serial batches; empty if it is.
+    /// Parts of a vector that belong to the colored and to the serial batches; empty if the vector is.
     pub(crate) fn parts_of<'v>(&self, vector: &'v mut PointVector) -> [&'v mut [Block]; 2] {
         if vector.is_empty() {
             [&mut [], &mut []]
@@ -56,16 +56,16 @@ impl Passes<'_> {
         Some(masses)
     }
 
-    /// Takes vectors back.
+    /// Takes vectors back, for reuse.
     pub fn give_back<I: IntoIterator<Item = PointVector, IntoIter: DoubleEndedIterator>>(
         &mut self,
         vectors: I,
     ) {
-        // The last one out is the first one in, so that each finds its own length again.
+        // The last one out is the first one in, so that each vector gets memory of its own length again.
         self.work.vectors.extend(vectors.into_iter().rev());
     }
 
-    /// Work on vectors, booked on `phase`; not done while another phase is repeated alone.
+    /// Runs `work` on vectors, booked on `phase`. Skipped while another phase is repeated alone.
     pub fn with_system<T: Default>(&mut self, phase: Phase, work: impl FnOnce(&mut System<'_>) -> T) -> T {
         if !self.input.phases.runs(phase) {
             return T::default();

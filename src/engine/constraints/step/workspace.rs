@@ -1,4 +1,4 @@
-//! What a step works on, what it is given, and what it counts.
+//! Working data, inputs and counts of a step.
 
 use crate::engine::clock::PhaseFilter;
 use crate::engine::constraints::impacts::{ImpactLaw, ImpactRecords};
@@ -15,7 +15,7 @@ use crate::engine::narrowphase::lanes::PoseRow;
 use crate::engine::params::{Budget, Parameters, Without};
 use std::fmt;
 
-/// Everything a step works on, kept from step to step so that nothing is allocated.
+/// Working data of a step. Kept from step to step, so that nothing is allocated.
 #[derive(Debug, Default)]
 pub struct Workspace {
     /// One row per body, and an inert one at the end.
@@ -24,30 +24,30 @@ pub struct Workspace {
     pub motion: Motion,
     /// Colored batches at the chosen width.
     pub lanes: Batches,
-    /// Contacts that are solved one after the other: all of them in natural order, else the overflow.
+    /// Contacts that are solved one after the other: all of them in natural order, otherwise the overflow.
     pub serial: Batches,
     /// Constraints of other types than contacts.
     pub types: Vec<Joined>,
-    /// Poses at the start of the step, where there are such constraints; one per row.
+    /// Poses at the start of the step, one per row, if there are such constraints.
     pub poses: Vec<PoseRow>,
     /// Numbers that a solver keeps per contact, per contact point and per body.
     pub kept: Kept,
-    /// Side records of what bounces; empty in scenes without restitution.
+    /// Side records for restitution; empty in scenes without restitution.
     pub impacts: ImpactRecords,
-    /// Vectors that solvers have given back.
+    /// Vectors that solvers have returned, for reuse.
     pub vectors: Vec<PointVector>,
     /// Called after each iteration of a solver.
     pub watch: Option<Watch>,
-    /// Keep the rule of the last velocity sweep in `last_rule`.
+    /// Whether to keep the rule of the last velocity sweep in `last_rule`.
     pub observe: bool,
-    /// See `observe`.
+    /// Rule of the last velocity sweep; see `observe`.
     pub last_rule: Option<ObservedRule>,
 }
 
-/// Is shown the problem after each of a solver's iterations, which are counted from 1 in each step.
+/// Receives the problem after each iteration of a solver. Iterations are counted from 1 in each step.
 pub struct Watch(pub Box<IterationObserver>);
 
-/// Is given the number of an iteration and the problem after it.
+/// Receives the number of an iteration, and the problem after it.
 pub type IterationObserver = dyn FnMut(u32, &mut System<'_>) + Send;
 
 impl fmt::Debug for Watch {
@@ -56,7 +56,7 @@ impl fmt::Debug for Watch {
     }
 }
 
-/// A copy is not watched: a closure cannot be copied.
+/// The copy has no `watch`, because a closure cannot be copied.
 impl Clone for Workspace {
     fn clone(&self) -> Self {
         Workspace {
@@ -77,25 +77,25 @@ impl Clone for Workspace {
 }
 
 impl Workspace {
-    /// Bytes held by what only some solvers have.
+    /// Bytes held for data that only some solvers use.
     pub fn own_bytes(&self) -> usize {
         self.kept.held_bytes() + self.vectors.iter().map(PointVector::held_bytes).sum::<usize>()
     }
 }
 
-/// Counts of a step.
+/// Work counts of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WorkCount {
-    /// Passes over all constraints that solve something; warm starts are not counted.
+    /// Passes over all constraints that solve rows. Warm starts are not counted.
     pub sweeps: usize,
     /// Rows solved in all sweeps: a normal row per point, and a tangential one where the
     /// sweep has friction.
     pub row_updates: usize,
-    /// Points solved by impacts before the step.
+    /// Visits of points in the solution of impacts before the step.
     pub impact_visits: usize,
-    /// Islands whose impacts were not followed to their end.
+    /// Islands whose impacts were cut off by a limit.
     pub cut_impacts: usize,
-    /// Substeps that were too large for the solver's own method, so that sweeps alone solved them.
+    /// Substeps that were too large for the solver's own method and were solved by sweeps alone.
     pub unsolved: usize,
 }
 
@@ -104,7 +104,7 @@ pub struct WorkCount {
 pub struct StepInput {
     /// Features of the scene.
     pub features: Features,
-    /// Work per step.
+    /// Work allowed per step.
     pub budget: Budget,
     /// Substep (s).
     pub h: f32,
@@ -116,10 +116,10 @@ pub struct StepInput {
     pub without: Without,
     /// Which phases run.
     pub phases: PhaseFilter,
-    /// Sum impulses into [`crate::engine::contacts::Contact::step_impulse`].
+    /// Whether to sum impulses into [`crate::engine::contacts::Contact::step_impulse`].
     pub record_impulses: bool,
-    /// Where bodies hit each other.
+    /// Impact law of the run.
     pub impacts: ImpactLaw,
-    /// Points of all contacts, to count rows by.
+    /// Number of points of all contacts, to count rows.
     pub points: usize,
 }

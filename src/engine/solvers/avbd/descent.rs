@@ -1,30 +1,31 @@
-//! Block descent: bodies go, one color after the other, where their inertia and the penalties of their contacts
-//! are in balance. The method is told in `solvers/avbd.rs`.
+//! Block descent: color by color, bodies move to where their inertia and the penalties of their contacts are
+//! in balance. `solvers/avbd.rs` describes the method.
 //!
 //! # A contact as seen from a body
 //!
-//! Rows are linear in the motion of a step. With x = (Δx, Δy, Δθ) of the own body and o of the other,
-//! signed such that a growing separation is positive,
+//! Rows are linear in the motion of a step. With x = (Δx, Δy, Δθ) of the own body and o of the other, and
+//! signs such that an increasing separation is positive,
 //!
 //! ```text
 //! C_n = s + ε + n·(x − o) + A_n Δθ + B_n Δθ_o − α C_n⁰,   C_t = (1 − α) d + t·(x − o) + A_t Δθ + B_t Δθ_o − C_t⁰
 //! ```
 //!
-//! with ±n for body b and a, arms A and B of the own and the other body, the margin ε, the drift d of the point since it
-//! stuck, and C⁰ at the start of the substep; C_n⁰ is 0 where there is a gap, which may close. So a contact has one
-//! record for each of its bodies, and nothing of it is computed again in an iteration.
+//! with ±n for body b and a, arms A and B of the own and the other body, the margin ε, the drift d of the
+//! point since it began to stick, and C⁰ at the start of the substep. For a gap, C_n⁰ is 0, so that it may
+//! close. A contact thus has one record for each of its bodies, and nothing in it is recomputed during
+//! iterations.
 //!
 //! # Where bodies begin
 //!
-//! A body that rests is held against its weight, and begins best where it is; one that falls begins best at its inertial
-//! place. So it begins at x + h v + w h² a, w being the share of a by which it was accelerated in the last substep:
-//! w = (v − v_last)·h a/|h a|², from 0 to 1.
+//! A resting body is held against its weight; its best start is its current position. The best start of a
+//! falling body is its inertial position. So a body starts at x + h v + w h² a, where w is the fraction of a
+//! that accelerated it in the last substep: w = (v − v_last)·h a/|h a|², from 0 to 1.
 //!
 //! # One body
 //!
-//! The system of a body is 3 × 3, symmetric and positive definite: M/h² on its diagonal, and a
-//! square k JᵀJ for each row. It is solved as L D Lᵀ in the order x, y, θ, in lanes and in `f32`: what
-//! rounding does to the step of a body, its next step sees and mends, as forces are recomputed from positions.
+//! The system of a body is 3 × 3, symmetric and positive definite: M/h² on its diagonal, and k JᵀJ for each
+//! row. It is solved as L D Lᵀ in the order x, y, θ, in lanes and in `f32`. Rounding errors in the step of a
+//! body are corrected in its next step, because forces are recomputed from positions.
 
 use super::input::{DescentInput, PENALTY};
 use super::joints::JointDescent;
@@ -34,28 +35,29 @@ use crate::engine::constraints::records::graph::Graph;
 use crate::engine::contacts::{Contact, quad};
 use crate::engine::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, Quad, held};
 
-/// Overlap that is no error (m): `COLLISION_MARGIN` of the source.
+/// Overlap that does not count as an error (m): `COLLISION_MARGIN` of the source.
 const MARGIN: f32 = 5e-4;
-/// A point that has drifted farther (m) does not stick: `STICK_THRESH` of the source.
+/// Largest drift of a sticking point (m): `STICK_THRESH` of the source.
 const REACH: f32 = 0.01;
 
-/// Kept per point: λn, λt (N), kn, kt (N/m), and how far it has drifted since it stuck (m).
+/// Index of λn among the numbers kept per point: λn, λt (N), kn, kt (N/m), and the drift since the point
+/// began to stick (m).
 pub const NORMAL: usize = 0;
 /// See [`NORMAL`].
 pub const TANGENT: usize = 1;
 const NORMAL_PENALTY: usize = 2;
 const TANGENT_PENALTY: usize = 3;
-/// Numbers kept per point, two times four for gathers; the last three are not used.
+/// Numbers kept per point: two groups of four for gathers; the last three are unused.
 pub const PER_POINT: usize = 8;
-/// Numbers kept per body: its velocity before the forces of the last substep, and one that is not used.
+/// Numbers kept per body: its velocity before the forces of the last substep, and an unused one.
 pub const PER_BODY: usize = 4;
 
-/// Lane vectors of a contact: ±n and µ, then per point those of [`POINT`].
+/// Lane vectors of a contact: ±n and µ, then those of [`POINT`] for each point.
 const RECORD: usize = 3 + 2 * POINT;
-/// A_n, A_t, B_n, B_t, s + ε, C_n⁰, d − C_t⁰, d, and 1 if the point is there.
+/// A_n, A_t, B_n, B_t, s + ε, C_n⁰, d − C_t⁰, d, and 1 if the point exists.
 const POINT: usize = 9;
 const IS_THERE: usize = 8;
-/// Lane vectors of a body: its inertial place, M/h² (kg/s²), I/h², and 0 if it does not turn.
+/// Lane vectors of a body: its inertial position, M/h² (kg/s²), I/h², and 1 if it can turn, else 0.
 const BODY: usize = 6;
 
 /// Buffers of block descent, kept from step to step to avoid allocation.
@@ -77,7 +79,7 @@ impl Descent {
         self.lanes.held_bytes() + self.joints.held_bytes() + records.into_iter().map(held).sum::<usize>()
     }
 
-    /// Gives bodies their lanes, by colors or one by one in the `sequence` of contacts.
+    /// Assigns bodies to lanes: by colors, or one by one in the `sequence` of contacts.
     pub(crate) fn assign(
         &mut self,
         rows: &[BodyRow],
@@ -101,8 +103,8 @@ impl Descent {
         }
     }
 
-    /// Begins a substep of `h` (s): records of all contacts, then bodies go to where they begin, moving for
-    /// `motion` (s); of multipliers and penalties remain the shares `keep`.
+    /// Begins a substep of `h` (s): fills the records of all contacts, then moves bodies to where they start,
+    /// by their velocities over `motion` (s). Multipliers and penalties are multiplied by `keep`.
     pub(crate) fn begin(&mut self, on: &mut DescentInput<'_>, h: f32, motion: f32, keep: [f32; 2]) {
         let Descent { lanes, bodies, ends, contacts, joints } = self;
         joints.begin(on, h, keep);
@@ -114,7 +116,7 @@ impl Descent {
             }
         }
         at_width!(lanes.width, begin_bodies(lanes, bodies, on, h));
-        // A body without contacts takes no step of its own: it stays at its inertial place.
+        // A body without contacts takes no descent step: it stays at its inertial position.
         for body in lanes.solved() {
             let (row, force) = (&mut on.rows[body], &on.increments[body]);
             let held = 1.0 - share(force, row, on.kept.body(body));
@@ -134,7 +136,8 @@ impl Descent {
         }
     }
 
-    /// Every body takes one step, of errors at the start of the substep the share `alpha` left alone.
+    /// Every body takes one step. The fraction `alpha` of the errors at the start of the substep is left
+    /// alone.
     pub(crate) fn descend(&mut self, on: &mut DescentInput<'_>, alpha: f32) {
         at_width!(
             self.lanes.width,
@@ -142,13 +145,13 @@ impl Descent {
         );
     }
 
-    /// Multipliers take the forces over; penalties of rows within their bounds grow by `beta` (N/m²).
+    /// Multipliers become the forces. Penalties of rows within their bounds grow by `beta` (N/m²).
     pub(crate) fn raise(&mut self, on: &mut DescentInput<'_>, alpha: f32, beta: f32) {
         at_width!(self.lanes.width, raise(&self.lanes.contacts, &self.contacts, on, alpha, beta));
         self.joints.raise(on, alpha, beta);
     }
 
-    /// Points that stick take up how far they have drifted; the others forget it. Joints get their impulses.
+    /// Sticking points store their drift; other points reset it. Joints get their impulses.
     pub(crate) fn hold(&mut self, on: &mut DescentInput<'_>) {
         at_width!(self.lanes.width, hold(&self.lanes.contacts, &self.contacts, on));
         self.joints.store(on);
@@ -160,7 +163,7 @@ impl Descent {
     }
 }
 
-/// w: the share of its forces, `force` = h a, that accelerated a body in the last substep.
+/// w: the fraction of its forces, `force` = h a, that accelerated a body in the last substep.
 fn share(force: &[f32; 4], row: &BodyRow, last: &[f32]) -> f32 {
     let square = force[0] * force[0] + force[1] * force[1];
     let along = |k: usize| (row.velocity[k] - force[k] - last[k]) * force[k];
@@ -173,7 +176,7 @@ fn moved<L: Lanes>(rows: &[BodyRow], index: LaneIndex<L::Index>) -> [L; 4] {
     L::gather_quads::<2, 1>(bytemuck::cast_slice(rows), index)
 }
 
-/// The records of contacts, of the places where bodies are.
+/// Fills the records of contacts at the current positions of the bodies.
 #[inline(never)]
 fn fill<L: Lanes>(ends: &Ends, records: &mut [Block], on: &mut DescentInput<'_>) {
     use quad::*;
@@ -205,7 +208,7 @@ fn fill<L: Lanes>(ends: &Ends, records: &mut [Block], on: &mut DescentInput<'_>)
                     L::gather_quads::<STRIDE, STATE_1>(quads, contact),
                 )
             };
-            // An empty lane has side 0 and with it n = 0.
+            // An empty lane has side 0 and therefore n = 0.
             let is_there = side * side * if p == 0 { one } else { count.select_equal(two, one, zero) };
             let from = |b: L, a: L| side.select_positive(b, a);
             let own_arm = [from(bx, ax), from(by, ay)];
@@ -228,7 +231,7 @@ fn fill<L: Lanes>(ends: &Ends, records: &mut [Block], on: &mut DescentInput<'_>)
     }
 }
 
-/// The records of bodies, which are at their inertial place.
+/// Fills the records of bodies, which are at their inertial positions.
 #[inline(never)]
 fn begin_bodies<L: Lanes>(lanes: &BodyLanes, records: &mut [Block], on: &DescentInput<'_>, h: f32) {
     let records: &mut [L] = bytemuck::cast_slice_mut(records);
@@ -236,7 +239,7 @@ fn begin_bodies<L: Lanes>(lanes: &BodyLanes, records: &mut [Block], on: &Descent
     for (record, index) in records.chunks_exact_mut(BODY).zip(lanes.bodies.list().batches()) {
         let row = L::gather(on.rows, index);
         let (inv_mass, inv_inertia) = (row[3], row[7]);
-        // The inert row, and what does not turn, gets the identity.
+        // The inert row, and bodies that cannot turn, get the identity.
         let over = |inverse: L| inverse.select_positive(one / (inverse * square), one);
         let does_turn = inv_inertia.select_positive(one, zero);
         record.copy_from_slice(&[row[4], row[5], row[6], over(inv_mass), over(inv_inertia), does_turn]);
@@ -245,7 +248,7 @@ fn begin_bodies<L: Lanes>(lanes: &BodyLanes, records: &mut [Block], on: &Descent
 
 /// The two rows of a point.
 struct BlockRows<L> {
-    /// Of the own body, along n and t.
+    /// Jacobians of the own body, along n and t.
     jacobian: [[L; 3]; 2],
     error: [L; 2],
     force: [L; 2],
@@ -273,7 +276,7 @@ fn rows<L: Lanes>(record: &[L], p: usize, x: [L; 4], o: [L; 4], kept: [L; 4], al
     BlockRows { jacobian: [[n[0], n[1], a_n], [t[0], t[1], a_t]], error, force: [normal, tangent], bound }
 }
 
-/// The numbers kept at both points of contacts.
+/// The kept numbers of both points of contacts.
 #[inline(always)]
 fn kept_of<L: Lanes>([first, second]: [&[Quad]; 2], contact: LaneIndex<L::Index>) -> [[L; 4]; 2] {
     [L::gather_quads::<2, 0>(first, contact), L::gather_quads::<2, 0>(second, contact)]
@@ -312,8 +315,8 @@ fn descend<L: Lanes>(
             for (p, kept) in kept_of::<L>(kept, contact).into_iter().enumerate() {
                 let rows = rows(record, p, x, o, kept, alpha);
                 let is_there = record[3 + POINT * p + IS_THERE];
-                // A row at its bound keeps its stiffness: without it a body would go past where the row
-                // takes hold again, and back, forever.
+                // A row at its bound keeps its stiffness. Without it, a body would overshoot the place where
+                // the row takes hold again, and oscillate forever.
                 let rubs = record[2].select_positive(kept[TANGENT_PENALTY], zero);
                 for (axis, penalty) in [kept[NORMAL_PENALTY], rubs].into_iter().enumerate() {
                     let [jx, jy, jw] = rows.jacobian[axis];
@@ -337,7 +340,7 @@ fn descend<L: Lanes>(
     }
 }
 
-/// What joints add to the systems of a batch of bodies.
+/// Contributions of joints to the systems of a batch of bodies.
 #[inline(never)]
 fn joint_systems<L: Lanes>(
     joints: &mut JointDescent,
@@ -357,7 +360,7 @@ fn joint_systems<L: Lanes>(
     sums
 }
 
-/// K x = f for a symmetric positive definite K, given by its upper half, as L D Lᵀ.
+/// Solves K x = f for a symmetric positive definite K, given by its upper half, as L D Lᵀ.
 #[inline(always)]
 fn solve<L: Lanes>([xx, xy, xw, yy, yw, ww]: [L; 6], [fx, fy, fw]: [L; 3]) -> [L; 3] {
     let one = L::splat(1.0);

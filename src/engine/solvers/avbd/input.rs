@@ -1,4 +1,4 @@
-//! What passes of block descent work on.
+//! Inputs of the passes of block descent.
 
 use crate::engine::constraints::kernels::types::Joined;
 use crate::engine::constraints::records::graph::Graph;
@@ -7,7 +7,7 @@ use crate::engine::contacts::Contact;
 use crate::engine::lanes::BodyRow;
 use crate::engine::narrowphase::lanes::PoseRow;
 
-/// Least and greatest penalty (N/m).
+/// Minimum and maximum penalty (N/m).
 pub(crate) const PENALTY: [f32; 2] = [1.0, 1e9];
 
 /// Inputs of a pass of block descent.
@@ -17,13 +17,13 @@ pub(crate) struct DescentInput<'a> {
     pub contacts: &'a [Contact],
     /// h a of each body, see [`Motion::velocity_increments`](crate::engine::constraints::kernels::motion::Motion).
     pub increments: &'a [[f32; 4]],
-    /// The last row is none.
+    /// Number of bodies; the last row is not a body.
     pub bodies: usize,
     pub rotation: bool,
     pub friction: bool,
     pub types: &'a mut [Joined],
     pub poses: &'a [PoseRow],
-    /// Of contacts and, behind them, joints.
+    /// Edges are the contacts and, after them, joints.
     pub graph: &'a Graph,
     /// Substep (s).
     pub h: f32,

@@ -1,8 +1,9 @@
-//! Joints in block descent, one by one: what a joint states as rows becomes forces and stiffness of its bodies.
+//! Joints in block descent, one by one: the rows of a joint become forces and stiffness on its bodies.
 //!
 //! # Forces
 //!
-//! A row has its error C where bodies are now, C⁰ at the start of the substep, a multiplier λ and a penalty k:
+//! A row has an error C at the current positions, C⁰ at the start of the substep, a multiplier λ and a
+//! penalty k:
 //!
 //! ```text
 //! rigid    f = λ − k (C − α C⁰)
@@ -11,14 +12,15 @@
 //! spring   f = −K⁻¹ (S C⁰ + D (C − C⁰)/h)/h, |f| ≤ F
 //! ```
 //!
-//! The last is the spring of all solvers, λ = −K⁻¹ (S x + D v⁺) (see `constraints/joints/rows.rs`), with f = λ/h and the
-//! velocity v⁺ = (C − C⁰)/h that the substep ends with. Springs and motors have stiffness of their own, K⁻¹ D/h² and K⁻¹/h²,
-//! and no penalty that grows.
+//! The last line is the spring of all solvers, λ = −K⁻¹ (S x + D v⁺) (see `constraints/joints/rows.rs`), with
+//! f = λ/h and v⁺ = (C − C⁰)/h, the velocity at the end of the substep. Springs and motors have their own
+//! stiffness, K⁻¹ D/h² and K⁻¹/h², and no growing penalty.
 //!
 //! # Stiffness
 //!
-//! C is taken where bodies are, not along its tangent. What a turning arm adds to the stiffness is f ∂²C/∂θ² = f d·r of a
-//! row along d; its size is |f| √(|r|² − s²) with s = r × d, and is added to the diagonal as the source does.
+//! C is evaluated at the current positions, not linearized. A turning arm adds f ∂²C/∂θ² = f d·r to the
+//! stiffness of a row along d. Its magnitude, |f| √(|r|² − s²) with s = r × d, is added to the diagonal, as
+//! in the source.
 
 use super::input::{DescentInput, PENALTY};
 use crate::engine::constraints::joints::rows::{RowBlock, RowLaw};
@@ -29,20 +31,20 @@ use crate::engine::lanes::held;
 /// Numbers per row of a block.
 type JointRows = [f32; ROWS];
 
-/// Joints of a world, and what is kept of their rows.
+/// Joints of a world, and the state of their rows.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct JointDescent {
-    /// Type of each joint and its number in it. `[joints]`
+    /// Type of each joint, and its index within the type. `[joints]`
     places: Vec<[u32; 2]>,
-    /// Where its blocks begin, and where the last ones end. `[joints + 1]`
+    /// Where the blocks of each joint begin, and where the last ones end. `[joints + 1]`
     starts: Vec<u32>,
-    /// Their bodies. `[blocks]`
+    /// Bodies of each block. `[blocks]`
     bodies: Vec<[u32; 2]>,
     blocks: Vec<KeptBlock>,
     found: Vec<RowBlock>,
 }
 
-/// What is kept of a block from iteration to iteration, and of its penalties from step to step.
+/// State of a block from iteration to iteration; penalties are also kept from step to step.
 #[derive(Clone, Copy, Debug, Default)]
 struct KeptBlock {
     /// λ (N or N·m)
@@ -53,15 +55,15 @@ struct KeptBlock {
     first: JointRows,
 }
 
-/// A block where bodies are now.
+/// Forces of a block at the current positions.
 struct Forces {
     /// f (N or N·m)
     force: JointRows,
     /// −∂f/∂C
     stiffness: [JointRows; ROWS],
-    /// What is to vanish (m or rad).
+    /// Error to be removed (m or rad).
     error: JointRows,
-    /// The rows' penalties may grow.
+    /// Whether the penalties of the rows may grow.
     grows: bool,
 }
 
@@ -74,7 +76,7 @@ impl JointDescent {
         held(&self.places) + held(&self.starts) + held(&self.bodies) + held(&self.blocks) + held(&self.found)
     }
 
-    /// Lists the joints. Penalties are kept while the joints stay the same ones.
+    /// Lists the joints. Penalties are kept as long as the joints stay the same.
     pub fn assign(&mut self, types: &mut [Joined], on: Placed<'_>) {
         self.places.clear();
         self.starts.clear();
@@ -96,7 +98,7 @@ impl JointDescent {
         }
     }
 
-    /// The blocks of joint `joint`, where bodies are now.
+    /// Collects the blocks of `joint` at the current positions of bodies; returns their range in `blocks`.
     fn collect(&mut self, joint: usize, on: &mut DescentInput<'_>) -> std::ops::Range<usize> {
         let [t, i] = self.places[joint];
         self.found.clear();
@@ -105,7 +107,7 @@ impl JointDescent {
         self.starts[joint] as usize..self.starts[joint + 1] as usize
     }
 
-    /// Begins a substep of `h` (s), before bodies move; of multipliers and penalties remain the shares `keep`.
+    /// Begins a substep of `h` (s), before bodies move. Multipliers and penalties are multiplied by `keep`.
     pub fn begin(&mut self, on: &mut DescentInput<'_>, h: f32, keep: [f32; 2]) {
         for joint in 0..self.places.len() {
             let range = self.collect(joint, on);
@@ -126,8 +128,8 @@ impl JointDescent {
         }
     }
 
-    /// What the joints of a body, edges `joints`, add to its system: the upper half of the matrix row by row, and the
-    /// right-hand side.
+    /// Contribution of the joints of a body, edges `joints`, to its system: the upper half of the matrix row
+    /// by row, and the right-hand side.
     pub fn system(
         &mut self,
         body: u32,
@@ -164,7 +166,7 @@ impl JointDescent {
         sum
     }
 
-    /// Multipliers take the forces over; penalties of rows within their bounds grow by `beta` (N/m²).
+    /// Multipliers become the forces. Penalties of rows within their bounds grow by `beta` (N/m²).
     pub fn raise(&mut self, on: &mut DescentInput<'_>, alpha: f32, beta: f32) {
         for joint in 0..self.places.len() {
             let range = self.collect(joint, on);
@@ -179,7 +181,7 @@ impl JointDescent {
         }
     }
 
-    /// Impulses h f become those of the joints.
+    /// Stores the impulses h f in the joints.
     pub fn store(&mut self, on: &mut DescentInput<'_>) {
         for joint in 0..self.places.len() {
             let range = self.collect(joint, on);
@@ -192,7 +194,7 @@ impl JointDescent {
     }
 }
 
-/// See the [module](self).
+/// Forces of a block; see the [module](self).
 fn forces(block: &RowBlock, kept: &KeptBlock, h: f32, alpha: f32) -> Forces {
     let mut stiffness = [[0.0; ROWS]; ROWS];
     let mut error = [0.0; ROWS];

@@ -1,11 +1,12 @@
-//! Bodies in lanes: which of them are solved together, and with which contacts.
+//! Bodies in lanes: which bodies are solved together, and with which contacts.
 //!
-//! Bodies of one color share no contact and no joint, so that each of them can be solved as if alone. Colors are given
-//! greedily in the order of the bodies; within a color bodies with as many contacts stand together. A batch of
-//! bodies goes through their contacts by rank: first the first contact of each, then the second, and
-//! a body that has no more gets an empty one. What becomes of a body does not depend on the batch in
-//! which it is, only on its color: the result has the same bits at every width. Where contacts come one after the
-//! other there are no colors, and bodies come one by one as those contacts name them first.
+//! Bodies of one color share no contact and no joint, so each can be solved as if alone. Colors are assigned
+//! greedily in the order of the bodies; within a color, bodies with equally many contacts are next to each
+//! other. A batch of bodies goes through its contacts by rank: first the first contact of each body, then the
+//! second, and so on. A body with fewer contacts gets empty ones. The result for a body depends only on its
+//! color, not on its batch, so all widths give the same bits. Where contacts are solved one after the other
+//! there are no colors, and bodies are solved one by one in the order in which those contacts first refer to
+//! them.
 
 use crate::engine::constraints::records::graph::Graph;
 use crate::engine::contacts::Contact;
@@ -14,20 +15,20 @@ use crate::engine::lanes::{Indices, LaneVec, LaneWidth, held};
 /// Bodies that are solved together.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BodyBatch {
-    /// Most contacts that one of them has.
+    /// Largest number of contacts of one of them.
     pub ranks: usize,
-    /// The first of so many batches of [`BodyLanes::ends`].
+    /// Index of its first batch in [`BodyLanes::ends`]; there is one per rank.
     pub first: usize,
 }
 
-/// Contacts as seen from one of their bodies, its own, batch by batch.
+/// Contacts as seen from one of their bodies, the own body, batch by batch.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Ends {
     /// `[batches × width]`
     pub contact: Indices,
-    /// Rows of the bodies that see them. `[batches × width]`
+    /// Rows of the own bodies. `[batches × width]`
     pub own: Indices,
-    /// Rows of the others; the inert one for what is no body. `[batches × width]`
+    /// Rows of the other bodies; the inert row if there is none. `[batches × width]`
     pub other: Indices,
     /// 1 where the own body is b, −1 where it is a, 0 in an empty lane. `[batches × width]`
     pub side: LaneVec,
@@ -38,18 +39,18 @@ pub(crate) struct Ends {
 pub(crate) struct BodyLanes {
     /// Lanes per batch.
     pub width: LaneWidth,
-    /// In the order in which they are solved.
+    /// In the order of solving.
     pub batches: Vec<BodyBatch>,
-    /// Rows of bodies; the inert one in an empty lane. `[batches × width]`
+    /// Rows of bodies; the inert row in an empty lane. `[batches × width]`
     pub bodies: Indices,
     /// The contacts of the bodies.
     pub ends: Ends,
-    /// Every contact once, seen from body b; the last batch is filled up with its last contact.
+    /// Every contact once, seen from body b; the last batch is padded with the last contact.
     pub contacts: Ends,
     order: Vec<u32>,
-    /// By body; [`NONE`] of what is not solved.
+    /// Color of each body; [`NONE`] if it is not solved. `[bodies]`
     colors: Vec<u32>,
-    /// Which body has last seen a neighbor of this color.
+    /// For each color, the last body with a neighbor of that color.
     seen_by: Vec<u32>,
 }
 
@@ -87,8 +88,9 @@ impl BodyLanes {
         self.order.iter().map(|&body| body as usize)
     }
 
-    /// Gives lanes to the bodies that have contacts or joints and are dynamic, by colors, or one by one in the `sequence`
-    /// of contacts and then of joints; `inert` is the number of bodies. Edges of `graph` beyond the contacts are joints.
+    /// Assigns lanes to the dynamic bodies that have contacts or joints: by colors, or one by one in the
+    /// `sequence` of contacts and then of joints. `inert` is the number of bodies. Edges of `graph` beyond
+    /// the contacts are joints.
     pub fn assign(
         &mut self,
         width: LaneWidth,
@@ -99,7 +101,7 @@ impl BodyLanes {
         sequence: Option<&[u32]>,
     ) {
         let joints = contacts.len() as u32..graph.len() as u32;
-        // Edges ascend, contacts before joints.
+        // Edges ascend: contacts come before joints.
         let touching = |body: u32| {
             let edges = graph.edges_of(body as usize);
             &edges[..edges.partition_point(|&edge| edge < joints.start)]
@@ -143,7 +145,7 @@ impl BodyLanes {
                     let body = batch.get(lane).copied();
                     let edge = body.and_then(|b| touching(b).get(rank).map(|&edge| (b, edge)));
                     let Some((body, edge)) = edge else {
-                        // Some contact, which is not looked at.
+                        // Any contact; its side of 0 removes its effect.
                         self.ends.push(0, inert, inert, 0.0);
                         continue;
                     };
@@ -156,14 +158,15 @@ impl BodyLanes {
         self.contacts.clear();
         let filled = contacts.len().next_multiple_of(width);
         for i in 0..filled {
-            // No two lanes write different things in one place.
+            // Padding repeats the last contact, so that lanes with the same destination write the same
+            // values.
             let contact = i.min(contacts.len() - 1);
             let Contact { body_a, body_b, .. } = contacts[contact];
             self.contacts.push(contact as u32, row(body_b), row(body_a), 1.0);
         }
     }
 
-    /// The smallest color that no neighbor has, body by body.
+    /// Assigns to each body the smallest color that no neighbor has.
     fn color(&mut self, graph: &Graph) {
         self.seen_by.clear();
         for &body in &self.order {

@@ -1,16 +1,17 @@
-//! Manifolds that are kept while two bodies hardly move against each other, for solvers that want it.
+//! Manifolds that are kept while two bodies hardly move relative to each other. Used by solvers that opt in.
 //!
-//! A pair is not collided while, since its manifold was found, body b has moved by less than a distance as
-//! seen from a, and turned against it by less than acos 0.98 (`catto2024box2d`). Its points are then where they were on
-//! their bodies:
+//! The narrow phase skips a pair if, since its manifold was found, body b has moved by less than a given
+//! distance in the frame of a, and turned relative to a by less than acos 0.98 (`catto2024box2d`). Its points
+//! then stay fixed on their bodies:
 //!
 //! ```text
 //! r_a = R_a l_a,   r_b = R_b l_b,   n = R_a n_a,   s = s₀ + n·(d + r_b − r_a),   d = x_b − x_a
 //! ```
 //!
-//! with l and n_a as they were in the bodies' frames, and s₀ such that s is the separation that was found. Names
-//! and impulses of the points stay. What this cannot see is that another corner or face has come to
-//! touch. Discs are always collided: their points do not stay on them, and their manifold costs no more.
+//! where l and n_a are fixed in the bodies' frames, and s₀ is chosen such that s was the separation found.
+//! The points keep their feature ids and impulses. The method cannot notice that another corner or face has
+//! begun to touch. Discs are always collided: their points do not stay fixed on them, and their manifolds are
+//! just as cheap to find.
 
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::held;
@@ -19,20 +20,20 @@ use crate::engine::narrowphase::candidate::Candidates;
 use crate::engine::narrowphase::lanes::PoseRow;
 use glam::Vec2;
 
-/// Cosine of the turn from which a manifold is found again (1).
+/// Cosine of the relative rotation at which a manifold is recomputed (1).
 const SAME_TURN: f32 = 0.98;
 
 /// Kinds of pairs whose manifolds are kept.
 const KINDS: [PairKind; 2] = [PairKind::Rectangles, PairKind::Hulls];
 
-/// A manifold as it was found, on its bodies.
+/// A manifold when it was found, relative to its bodies.
 #[derive(Clone, Copy, Debug)]
 struct KeptManifold {
-    /// [`Candidates`] are sorted by it.
+    /// Sort key of [`Candidates`].
     pair: u64,
     /// d, in the frame of a (m).
     offset: Vec2,
-    /// Cosine and sine of the turn of b against a.
+    /// Cosine and sine of the rotation of b relative to a.
     turn: Vec2,
     /// n_a
     normal: Vec2,
@@ -42,26 +43,26 @@ struct KeptManifold {
     separation: [f32; 2],
 }
 
-/// The manifolds that are kept; see the [module](self).
+/// Kept manifolds; see the [module](self).
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Recycled {
     /// By kind, sorted by pair.
     found: [Vec<KeptManifold>; KINDS.len()],
     last_found: [Vec<KeptManifold>; KINDS.len()],
-    /// By candidate, whether its manifold is kept in this step.
+    /// Whether the manifold of each candidate is kept in this step. `[candidates]`
     kept: Vec<bool>,
-    /// Manifolds may be kept in this step.
+    /// Whether manifolds may be kept in this step.
     is_used: bool,
 }
 
-/// x_b − x_a, with what the positions are short of (m), and both rotations.
+/// x_b − x_a, including the low parts of the positions (m), and both rotations.
 fn poses([a, b]: [&PoseRow; 2]) -> (Vec2, [Vec2; 2]) {
     let along = |k: usize| (b.position[k] - a.position[k]) + (b.position[k + 2] - a.position[k + 2]);
     let rotation = |row: &PoseRow| Vec2::new(row.rotation[0], row.rotation[1]);
     (Vec2::new(along(0), along(1)), [rotation(a), rotation(b)])
 }
 
-/// `vector` as seen from a frame.
+/// `vector` in the coordinates of a frame.
 fn unrotate(frame: Vec2, vector: Vec2) -> Vec2 {
     Vec2::new(frame.x, -frame.y).rotate(vector)
 }
@@ -77,7 +78,7 @@ impl KeptManifold {
             anchors: contact.manifold.points.map(|p| [unrotate(a, p.anchor_a), unrotate(b, p.anchor_b)]),
             separation: [0.0; 2],
         };
-        // What the formula gives without s₀.
+        // The result of the formula without s₀.
         let mut plain = *contact;
         found.write(&mut plain, bodies);
         for p in 0..2 {
@@ -93,7 +94,7 @@ impl KeptManifold {
             && unrotate(a, b).dot(self.turn) > SAME_TURN
     }
 
-    /// The manifold where the bodies are now.
+    /// Writes the manifold for the current poses of the bodies.
     fn write(&self, contact: &mut Contact, bodies: [&PoseRow; 2]) {
         let (d, [a, b]) = poses(bodies);
         let normal = a.rotate(self.normal);
@@ -115,8 +116,8 @@ impl Recycled {
         lists.map(held).sum::<usize>() + held(&self.kept)
     }
 
-    /// Brings manifolds that are kept to where their bodies are, and notes in `keep` which candidates these are. With a
-    /// distance of zero none is.
+    /// Updates kept manifolds to the current poses, and marks their candidates in `keep`. With a distance of
+    /// zero none are kept.
     pub fn update(
         &mut self,
         candidates: Candidates<'_>,
@@ -146,8 +147,8 @@ impl Recycled {
         self.kept.clone_from(keep);
     }
 
-    /// Takes manifolds up that were found in this step, rounded as they will be when they are kept: who looks
-    /// for contacts twice finds the same.
+    /// Stores the manifolds found in this step, and rounds the contacts as they will be rounded while kept,
+    /// so that a second collision pass gives the same contacts.
     pub fn take_up(&mut self, candidates: Candidates<'_>, contacts: &mut [Contact]) {
         if !self.is_used {
             return;

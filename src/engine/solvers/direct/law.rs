@@ -1,5 +1,5 @@
-//! The contact law of an island around given impulses, and what is asked of it: the natural map and its norm, the linear
-//! problem of fixed states, a sweep, Lemke's method. See [`super`].
+//! The contact law of an island around given impulses: the natural map and its norm, the linear problem for
+//! fixed states, a sweep, Lemke's method. See [`super`].
 
 use super::{PASSES, PIVOTS, SHIFT, TOLERANCE};
 use crate::engine::constraints::numerics::block_lu::{BlockLu, inverse};
@@ -8,14 +8,14 @@ use crate::engine::constraints::records::rows::{RowBlock, RowLaw};
 use crate::engine::constraints::vectors::system::{Pair, PointRows};
 use crate::engine::lanes::BodyRow;
 
-/// What a row does in a linear problem.
+/// State of a row in a linear problem.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum State {
     /// u = 0.
     Holds,
-    /// λ is this.
+    /// λ has this value.
     Fixed(f64),
-    /// λ is this times that of the row before it.
+    /// λ is this multiple of the λ of the previous row.
     Slips(f64),
 }
 
@@ -24,13 +24,13 @@ pub(super) enum State {
 pub(super) struct Row {
     /// Rows of bodies a and b.
     pub bodies: [u32; 2],
-    /// The same among the bodies that can move; [`IMMOVABLE`] for others.
+    /// Indices of the bodies among the movable ones; [`IMMOVABLE`] for others.
     movable: [usize; 2],
-    /// Of a and b.
+    /// Parts of a and b.
     pub jacobian: [[f64; 3]; 2],
 }
 
-/// In [`Row::movable`].
+/// Index of immovable bodies in [`Row::movable`].
 const IMMOVABLE: usize = usize::MAX;
 
 impl Row {
@@ -45,7 +45,7 @@ impl Row {
         self.sides().for_each(|(body, j)| (0..3).for_each(|c| velocities[body][c] += j[c] * impulse));
     }
 
-    /// The bodies that can move, with this row on them.
+    /// The movable bodies, with their part of this row.
     #[inline]
     fn sides(&self) -> impl Iterator<Item = (usize, [f64; 3])> {
         self.movable.into_iter().zip(self.jacobian).filter(|side| side.0 != IMMOVABLE)
@@ -70,16 +70,16 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 enum Bound {
     Free,
     NotNegative,
-    /// The norm of this row and of those that follow, so many in all.
+    /// Bound on the norm of this row and the rows after it, `size` in all.
     Norm {
         cap: f64,
         size: usize,
     },
-    /// One that follows.
+    /// A later row of the same bound.
     Same,
 }
 
-/// The row of the Jacobian on bodies with these rows.
+/// The row of the Jacobian for these bodies.
 fn row(bodies: &[BodyRow], of: [u32; 2], jacobian: [[f64; 3]; 2]) -> Row {
     let side = |side: usize| {
         let mass = bodies.get(of[side] as usize).copied().unwrap_or_default();
@@ -94,11 +94,11 @@ fn row(bodies: &[BodyRow], of: [u32; 2], jacobian: [[f64; 3]; 2]) -> Row {
 
 /// A row that holds.
 struct HeldRow {
-    /// Its number.
+    /// Its index.
     at: usize,
-    /// s µ of a point that slips, 0 of others.
+    /// s µ for a slipping point, else 0.
     slope: f64,
-    /// Inverse root of its diagonal (kg^½).
+    /// Inverse square root of its diagonal (kg^½).
     scale: f64,
     /// Rows of P and Q.
     seen: Row,
@@ -106,7 +106,7 @@ struct HeldRow {
     b: f64,
 }
 
-/// Rows that hold and share a block of T.
+/// Holding rows that share a block of T.
 struct HeldGroup {
     first: usize,
     size: usize,
@@ -123,27 +123,27 @@ struct JointSoftness {
     r: [[f64; 3]; 3],
 }
 
-/// The law of an island around the impulses that the sweeps left. Rows 2i and 2i + 1 are the normal and the tangential one of
-/// point i; behind the points come rows of joints.
+/// The law of an island around the impulses left by the sweeps. Rows 2i and 2i + 1 are the normal and the
+/// tangential row of point i; joint rows follow after the points.
 pub(super) struct IslandLaw {
     pub points: Vec<PointRows>,
     friction: Vec<f64>,
     pub rows: Vec<Row>,
-    /// Of the rows of joints.
+    /// Bounds of the joint rows.
     bounds: Vec<Bound>,
     joints: Vec<JointSoftness>,
     /// λ₀ (N·s)
     pub start: Vec<f64>,
-    /// u there, the bias included (m/s).
+    /// u at λ₀, including the bias (m/s).
     velocity: Vec<f64>,
-    /// Of K + R (1/kg).
+    /// Diagonal of K + R (1/kg).
     diagonal: Vec<f64>,
-    /// Of each body that can move: those that a row ties to it, and it.
+    /// For each movable body: itself, and the bodies connected to it by a row.
     pub neighbors: Vec<Vec<usize>>,
 }
 
 impl IslandLaw {
-    /// Of contact points alone.
+    /// The law of contact points, without joints.
     pub fn new(
         points: Vec<PointRows>,
         bodies: &[BodyRow],
@@ -162,7 +162,7 @@ impl IslandLaw {
         IslandLaw { friction, start, velocity, rows, bounds, joints, diagonal, neighbors, points }
     }
 
-    /// Adds the rows of a block of a joint.
+    /// Adds the rows of a joint block.
     pub fn join(&mut self, bodies: &[BodyRow], block: &RowBlock, rate: f32, h: f32) {
         let (bias, softness) = (block.bias(rate, h), f64::from(block.softness()));
         let first = self.rows.len();
@@ -183,7 +183,7 @@ impl IslandLaw {
                 (_, Some(cap)) => Bound::Norm { cap: f64::from(cap), size: block.size },
                 _ => Bound::Free,
             });
-            // What nothing can move keeps its impulse.
+            // A row with no movable body and no softness keeps its impulse.
             if self.rows[first + k].coupling(&self.rows[first + k]) + r[k][k] <= 0.0 {
                 self.velocity[first + k] = 0.0;
                 r[k][k] = 1.0;
@@ -192,7 +192,7 @@ impl IslandLaw {
         self.joints.push(JointSoftness { first, size: block.size, r });
     }
 
-    /// Numbers the bodies that can move; with all rows in place.
+    /// Numbers the movable bodies. All rows must have been added.
     pub fn couple(&mut self) {
         let mut numbers = std::collections::BTreeMap::new();
         for side in self.rows.iter_mut().flat_map(|row| &mut row.movable).filter(|side| **side != IMMOVABLE) {
@@ -215,7 +215,7 @@ impl IslandLaw {
         }
     }
 
-    /// Changes of velocities by impulses, scaled to unit masses.
+    /// Velocity changes by impulses, scaled to unit masses.
     fn moved(&self, x: &[f64]) -> Vec<[f64; 3]> {
         let mut moved = vec![[0.0; 3]; self.neighbors.len()];
         self.rows.iter().zip(x).filter(|(_, x)| **x != 0.0).for_each(|(row, x)| row.push(&mut moved, *x));
@@ -309,7 +309,7 @@ impl IslandLaw {
         contacts + self.joint_states(arguments).map(joint).sum::<f64>()
     }
 
-    /// The merit of residuals that are rounding beside these impulses.
+    /// The merit at which residuals are mere rounding errors of these impulses.
     pub fn goal(&self, impulses: &[f64]) -> f64 {
         let one = |(i, l): (usize, &f64)| self.diagonal(i) * l * l;
         TOLERANCE * TOLERANCE * impulses.iter().enumerate().map(one).sum::<f64>()
@@ -331,7 +331,7 @@ impl IslandLaw {
         (0..self.points.len()).flat_map(one).chain(joints).collect()
     }
 
-    /// Rows of joints and what they do: they hold, or their impulse is the nearest one within its bounds.
+    /// Joint rows and their states: holding, or fixed at the nearest impulse within the bounds.
     fn joint_states(&self, arguments: &[f64]) -> impl Iterator<Item = (usize, State)> {
         let first = 2 * self.points.len();
         let mut scale = 1.0;
@@ -350,18 +350,19 @@ impl IslandLaw {
         })
     }
 
-    /// The impulses at which the rows that hold are at rest; none if that is singular.
+    /// The impulses at which the holding rows are at rest. `None` if the system is singular.
     ///
-    /// Let P be the rows that hold and Q what acts along them (a slipping point acts along n + s µ t), both scaled to
-    /// unit masses and a unit diagonal, and T = R + ε their own softness. Then (P Qᵀ + T) y = b, and with z = Qᵀ y, the change
-    /// of velocities,
+    /// Let P be the holding rows and Q the directions in which their impulses act (a slipping point acts
+    /// along n + s µ t), both scaled to unit masses and a unit diagonal. Let T = R + ε be their own softness.
+    /// Then (P Qᵀ + T) y = b, and with the velocity change z = Qᵀ y,
     ///
     /// ```text
     /// y = T⁻¹ (b − P z)        (1 + Qᵀ T⁻¹ P) z = Qᵀ T⁻¹ b
     /// ```
     ///
-    /// The second system has three rows per body, however many points it has, and couples bodies that touch. Since T⁻¹
-    /// magnifies rounding by 1/ε, it is solved again for what b − (P Qᵀ + T) y leaves.
+    /// The second system has three rows per body, however many points the body has, and couples bodies that
+    /// touch. T⁻¹ magnifies rounding errors by 1/ε, so the system is solved again for the residual,
+    /// b − (P Qᵀ + T) y.
     pub fn solve_states(&self, states: &[State], system: &mut BlockLu<3>) -> Option<Vec<f64>> {
         let mut impulses: Vec<f64> =
             states.iter().map(|state| if let State::Fixed(value) = state { *value } else { 0.0 }).collect();
@@ -451,7 +452,7 @@ impl IslandLaw {
         Some(impulses)
     }
 
-    /// T of the rows that hold: ε, and R of joints. None if that is singular.
+    /// T of the holding rows: ε, and R of joints. `None` if it is singular.
     fn groups(&self, held: &[HeldRow]) -> Option<Vec<HeldGroup>> {
         let mut groups = vec![];
         let (mut first, mut joints) = (0, self.joints.iter());
@@ -478,15 +479,15 @@ impl IslandLaw {
         Some(groups)
     }
 
-    /// The impulses of the same law by Lemke's method, see [`crate::engine::constraints::numerics::coulomb_lcp`]; of scenes
-    /// without joints.
+    /// The impulses of the same law by Lemke's method, see
+    /// [`crate::engine::constraints::numerics::coulomb_lcp`]. Only for islands without joints.
     pub fn by_lemke(&self) -> Option<Vec<f64>> {
         if !self.bounds.is_empty() {
             return None;
         }
         let n = self.start.len();
         let pair = |f: &dyn Fn(usize) -> f64| (0..n).step_by(2).map(|i| [f(i), f(i + 1)]).collect::<Vec<_>>();
-        // u without impulses, pulled toward λ₀ as in Newton's problem.
+        // u without impulses, shifted toward λ₀ as in Newton's problem.
         let pushed = self.times(&self.start);
         let free = |i: usize| self.velocity[i] - pushed[i] - SHIFT * self.diagonal(i) * self.start[i];
         let entry = |i: usize, j: usize| {

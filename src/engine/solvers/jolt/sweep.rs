@@ -13,7 +13,7 @@ use crate::engine::constraints::records::features::{
 };
 use crate::engine::lanes::{BodyRow, Lanes};
 
-/// One sweep; normal rows follow the rule.
+/// One sweep. Normal rows follow the rule.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ContactFriction(pub Rigid);
 
@@ -62,7 +62,7 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
             if O::HAS_ROW {
                 k = (inertia[0] * arm[0]).mul_add(arm[0], k);
             }
-            // Lanes without a contact have bodies without mass.
+            // Bodies of empty lanes have no mass.
             let mass = k.select_positive(L::splat(1.0) / k, zero);
             let bound = record[layout.friction] * load;
             let vt = with_arms::<L, N, O>(along_t, w, arm);

@@ -1,26 +1,27 @@
-//! The two passes of position-based dynamics with contacts: bodies are displaced until no point
-//! overlaps and sticking points are where they were, then velocities are corrected once.
+//! The two passes of position-based dynamics with contacts. The first displaces bodies until no point
+//! overlaps and sticking points are back in place; the second corrects velocities once.
 //!
 //! # Displacing
 //!
-//! A substep has moved the bodies by h v. Each overlapping point takes the displacement impulse
-//! Δλ = −(C + α̃ λ)/(k + α̃) (kg·m) along n, C = max(s, −v_max h), on arms that have turned, α̃ = α/h²
-//! being what the compliance α (m/N) is in these units (`macklin2016`, equation 18); then, if what it needs is
-//! within the cone of its λ, the one along t that takes back its slide d since the step began,
+//! A substep has moved the bodies by h v. Each overlapping point takes the displacement impulse Δλ = −(C + α̃
+//! λ)/(k + α̃) (kg·m) along n, with C = max(s, −v_max h), on turned arms. α̃ = α/h² is the compliance α (m/N)
+//! in these units (`macklin2016`, equation 18). Then the point takes the impulse along t that reverses its
+//! slide d since the step began, if that impulse is within the cone of its λ:
 //!
 //! ```text
 //! d = t·(Δx_b − Δx_a) + σ_b (r_b × t) − κ_b (r_b × n) − σ_a (r_a × t) + κ_a (r_a × n)
 //! ```
 //!
-//! with σ = sin Δθ and κ = 1 − cos Δθ, as t·r = r × n. The contact point of a disc stays on the line of
-//! centers: its turn counts by Δθ (r × t). Slides since the substep began, as `muller2020` has them, let
-//! stacks of three boxes rock with growing energy; `catto2024solver2d` takes those of the step. Bodies move at once, Δx = m⁻¹ Δλ, Δθ = I⁻¹ (r × u) Δλ, and
-//! the next point sees it. Records hold λ/h, an impulse (N·s).
+//! with σ = sin Δθ and κ = 1 − cos Δθ, since t·r = r × n. The contact point of a disc stays on the line of
+//! centers, so the rotation of a disc counts as Δθ (r × t). Slides since the substep began, as in
+//! `muller2020`, let stacks of three boxes rock with growing energy; `catto2024solver2d` measures them since
+//! the step began. Bodies move at once, Δx = m⁻¹ Δλ, Δθ = I⁻¹ (r × u) Δλ, and the next point uses the new
+//! positions. Records hold λ/h, an impulse (N·s).
 //!
 //! # Velocities
 //!
-//! Afterward v is what moved the bodies, displacements included. Points that pushed lose their
-//! normal velocity, and as much of their sliding velocity as kinetic friction takes, µ λ/h at most.
+//! Afterward v is the velocity that moved the bodies, displacements included. Points that pushed lose their
+//! normal velocity, and as much of their sliding velocity as kinetic friction removes, at most µ λ/h.
 //!
 //! Source: `muller2020` (sections 3.5 and 3.6), `catto2024solver2d` (`solve_xpbd`: the limit of C).
 
@@ -49,18 +50,18 @@ pub(crate) struct Displace<'a> {
     pub compliance: f32,
     /// The first sweep of a substep: λ starts at zero.
     pub first: bool,
-    /// Rows as they were before the substep displaced them.
+    /// Rows before the substep displaced them.
     pub before: &'a [BodyRow],
 }
 
 /// Corrects velocities; see the [module](self).
 pub(crate) struct AfterDisplacing<'a> {
-    /// Rebound speeds of points (m/s) in the colored and the serial batches; empty where nothing bounces.
+    /// Rebound speeds of points (m/s) in the colored and the serial batches; empty if nothing bounces.
     pub rebounds: [&'a mut [Block]; 2],
 }
 
-/// Finds how fast points shall leave: at e times the speed at which they come in, if that is more than gravity makes in two
-/// substeps (`muller2020`).
+/// Finds the rebound speed of points: e times the approach speed, if that approach is faster than what
+/// gravity adds in two substeps (`muller2020`).
 pub(crate) struct Approach<'a> {
     /// See [`AfterDisplacing::rebounds`].
     pub to: [&'a mut [Block]; 2],
@@ -102,7 +103,7 @@ impl Pass for Approach<'_> {
 impl Pass for Displace<'_> {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
         let once = PerLane::of_sweep(layout, true, opposite);
-        // Bodies as they are, and as they were before displacements.
+        // Current bodies, and bodies before displacements.
         PerLane { rows: 2 * once.rows, ..once }
     }
 
@@ -131,7 +132,8 @@ impl Pass for AfterDisplacing<'_> {
     }
 }
 
-/// Bodies, and the turns of round ones, which their rows do not show, as spins.
+/// Current bodies, and the bodies before, whose spins hold the rotation of round bodies (not part of the
+/// rows).
 struct Displaced<'a> {
     rows: &'a mut [BodyRow],
     before: &'a [BodyRow],
@@ -165,7 +167,7 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
     let layout = const { Layout::of::<N, O>() };
     let inv_h = L::splat(1.0 / h);
     let deepest = L::splat(-push_speed * h);
-    // α̃ (1/kg), and α̃ h, as records hold λ/h.
+    // α̃ (1/kg), and α̃ h, because records hold λ/h.
     let (compliance, of_impulse) = (L::splat(compliance / (h * h)), L::splat(compliance / h));
     let zero = L::zero();
     for_each_batch::<L, N, O, _>(store, batches, segment, |store, record, row_a, row_b| {
@@ -174,7 +176,7 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
         let n = [record[0], record[1]];
         let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];
-        // Of the centers, since the step began.
+        // Motion of the centers since the step began.
         let [mut moved, mut slide] = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], n);
         let mut angle = [a[TURN], b[TURN]];
         let hidden = [before.a[W], before.b[W]];
@@ -197,14 +199,14 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
             separation = with_arms::<L, N, O>(separation, [sine_a, sine_b], arm_n);
             separation = with_arms::<L, N, O>(separation, [versine_a, versine_b], arm_t);
             let [arm_n, _] = turned(arm_n, arm_t, [sine_a, sine_b], [versine_a, versine_b]);
-            // A point that is not there has no mass.
+            // A missing point has no mass.
             let is_there = record[layout.at(p, layout.normal_mass)];
             let overlap = is_there.select_positive(-separation.max(deepest).min(zero), zero);
             let at = layout.at(p, layout.normal_impulse);
             let old = if first { zero } else { record[at] };
             let wanted = of_impulse.neg_mul_add(old, overlap);
             let push = is_there.select_positive(wanted / (answer(arm_n) + compliance), zero);
-            // With compliance a push can be taken back, which leaves a rounding of it at most.
+            // With compliance, a push can be reversed; `max` removes the rounding error that remains.
             record[at] = inv_h.mul_add(push, old).max(zero);
             sum[0] = sum[0] + push;
             moved = mass_sum.mul_add(push, moved);
@@ -226,7 +228,7 @@ fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
                 let new = inv_h.mul_add(wanted, old);
                 let normal = record[layout.at(p, layout.normal_impulse)];
                 let bound = record[layout.friction] * normal;
-                // Within the cone: bound − |λt| is not negative.
+                // Within the cone if bound − |λt| is not negative.
                 let over = new.max(-new) - bound;
                 let held = over.select_positive(zero, normal.select_positive(wanted, zero));
                 record[at] = inv_h.mul_add(held, old);

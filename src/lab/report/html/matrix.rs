@@ -6,7 +6,7 @@ use crate::lab::picture::svg::escaped;
 use serde::Deserialize;
 use serde_json::Value;
 
-/// `verify.json` as far as the page needs it.
+/// The parts of `verify.json` that the page needs.
 #[derive(Debug, Deserialize)]
 pub struct VerifyFile {
     cases: Vec<MatrixCase>,
@@ -38,15 +38,15 @@ struct MatrixCell {
     tolerance: Value,
 }
 
-/// Blue within the tolerance, red beyond it, pale at its edge: distinct with any color vision.
+/// Blue within the tolerance, red beyond it, pale at the limit: distinct with any color vision.
 const WITHIN: [Color; 2] = [Color::rgb(0x4393c3), Color::rgb(0xe3eff6)];
 const BEYOND: [Color; 2] = [Color::rgb(0xfde0d0), Color::rgb(0xb2182b)];
 
-/// The color of a margin, and whether white letters are read better on it.
+/// The color of a margin, and whether white text is more readable on it.
 fn shade(margin: f64, passed: bool) -> (String, bool) {
     let ([from, to], share) = match passed {
         true => (WITHIN, margin.clamp(0.0, 1.0)),
-        // A thousand times the tolerance is the darkest.
+        // The darkest color is reached at a thousand times the tolerance.
         false => (BEYOND, margin.max(1.0).log10() / 3.0),
     };
     let Color(r, g, b, _) = from.toward(to, share);
@@ -62,7 +62,7 @@ fn word(value: &Value) -> String {
     value.as_f64().map_or_else(|| value.as_str().unwrap_or("–").to_string(), number)
 }
 
-/// The matrix as a table.
+/// The matrix as an HTML table.
 pub fn matrix(matrix: &VerifyFile) -> String {
     let mut solvers: Vec<&str> = Vec::new();
     for outcome in &matrix.results {
@@ -111,7 +111,7 @@ pub fn matrix(matrix: &VerifyFile) -> String {
     text + "</tbody></table>\n<p class=\"soft\">A cell is error ÷ tolerance: up to 1 passes, ✗ fails. *: required of the default solver.</p>\n"
 }
 
-/// Two digits.
+/// A number with two digits.
 fn short(margin: f64) -> String {
     match margin {
         0.0 => "0".into(),

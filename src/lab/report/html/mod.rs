@@ -1,4 +1,4 @@
-//! `report.html`: a study on one page that needs no network, made from its records alone.
+//! `report.html`: a study on one page that needs no network, made from the study's files.
 //!
 //! ```text
 //! study.json ──► StudyFile ──► words, overview, precision, sections ─┐
@@ -35,12 +35,12 @@ pub use sweep::svg as sweep_svg;
 /// Name of the page in the folder of a study.
 pub const NAME: &str = "report.html";
 
-/// Name of the recording number `i` of a study.
+/// File name of recording number `i` of a study.
 fn recording_name(i: usize) -> String {
     format!("replay-{}.rec", i + 1)
 }
 
-/// Replaces the recordings of a study's folder; returns their paths.
+/// Replaces the recordings in a study's folder; returns their paths.
 pub fn write_recordings(folder: &Path, recordings: &[Vec<u8>]) -> Result<Vec<PathBuf>, Error> {
     let mut paths = Vec::new();
     for i in 0..MOST {
@@ -57,10 +57,10 @@ pub fn write_recordings(folder: &Path, recordings: &[Vec<u8>]) -> Result<Vec<Pat
     Ok(paths)
 }
 
-/// Writes the page of a study into its folder, with what is there of `verify.json` and recordings;
-/// returns its path.
+/// Writes the page of a study into its folder, with the folder's `verify.json` and recordings if they exist;
+/// returns the path of the page.
 ///
-/// Errors: files there that are not what their names say.
+/// Errors: invalid files of these names.
 pub fn write(folder: &Path, study: &StudyFile) -> Result<PathBuf, Error> {
     let matrix_path = folder.join("verify.json");
     let matrix: Option<VerifyFile> = if matrix_path.exists() { Some(read_json(&matrix_path)?) } else { None };
@@ -243,7 +243,7 @@ fn machine(study: &StudyFile) -> String {
     )
 }
 
-/// The command line that repeats a study with these settings.
+/// The command that repeats a study with these settings.
 fn command(settings: &Value) -> String {
     let plain = |v: &Value| v.as_str().map_or_else(|| v.to_string(), str::to_string);
     let list = |v: &Value| v.as_array().map_or_else(Vec::new, |a| a.iter().map(plain).collect::<Vec<_>>());
@@ -253,7 +253,7 @@ fn command(settings: &Value) -> String {
             words.push(format!("--{name} {}", values.join(",")));
         }
     };
-    // What a quick study shortens has no option of its own.
+    // The settings that `--quick` shortens have no options of their own.
     let quick = settings["timing_steps"].as_u64().is_some_and(|n| n < 100);
     option("scenes", list(&settings["scenes"]));
     let solvers = settings["solvers"]
@@ -328,7 +328,7 @@ mod tests {
         StudyFile::new(&StudyPlan::quick(), records.to_vec(), vec!["arch".into()])
     }
 
-    /// Every element that is opened is closed, in order; cells and rows may close themselves.
+    /// Whether every opened element is closed, in order; cells and rows may close implicitly.
     fn is_balanced(page: &str) -> bool {
         let mut open: Vec<&str> = Vec::new();
         let optional = ["th", "td", "tr", "meta", "link", "input"];

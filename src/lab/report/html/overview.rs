@@ -1,5 +1,5 @@
-//! One plot over all scenes: how much slower than the fastest that holds, and how wrong in the
-//! tolerances of each scene.
+//! One plot over all scenes: time relative to the fastest setting that holds, against error ÷ tolerance of
+//! the scene.
 
 use super::panel::{Band, Labels, Panel, PlotArea, legend};
 use super::scale::{Scale, number};
@@ -8,18 +8,18 @@ use crate::lab::report::style::Style;
 use crate::lab::study::Record;
 use crate::lab::study::curve::solvers_of;
 
-/// A setting on a scene.
+/// A setting on one scene.
 struct Dot<'a> {
     entry: &'a Record,
-    /// Time relative to the fastest that holds there.
+    /// Time relative to the fastest setting that holds on this scene.
     slower: f64,
-    /// Which of the solver's budgets.
+    /// Index of the setting among those of the solver.
     budget: usize,
 }
 
-/// Errors this much within tolerance are as good as none.
+/// Errors below this fraction of the tolerance are drawn at it.
 const LEAST: f64 = 1e-3;
-/// Errors this much beyond it are as good as any.
+/// Errors above this multiple of the tolerance are drawn at it.
 const MOST: f64 = 1e4;
 
 fn dots(records: &[Record]) -> Vec<Dot<'_>> {
@@ -32,7 +32,8 @@ fn dots(records: &[Record]) -> Vec<Dot<'_>> {
             continue;
         }
         for solver in solvers_of(records) {
-            // One treatment of impacts, the first: others are runs of their own, and not on every scene.
+            // Only the first treatment of impacts: the others are separate runs that do not exist on every
+            // scene.
             let own = entries.iter().filter(|e| e.solver == solver && e.impacts == scene[0].impacts);
             for (budget, entry) in own.enumerate() {
                 dots.extend(entry.time().map(|time| Dot { entry, slower: time / least, budget }));
@@ -126,7 +127,7 @@ pub fn overview(records: &[Record]) -> String {
     }
     for (at, name) in names {
         let size = [7.4 * name.chars().count() as f64, 12.0];
-        // Farther away where it is crowded, with a line to its mark.
+        // In a crowded place the label is farther away and connected to its marker by a line.
         let near = [10.0, 40.0, 80.0, 130.0, 190.0];
         if let Some((r, place)) =
             near.into_iter().find_map(|r| Some((r, labels.place(at, r, size, panel.sides())?)))

@@ -5,13 +5,13 @@ use crate::lab::picture::axes::wrapped;
 use crate::lab::picture::svg::{escaped, points, px};
 use crate::lab::report::style::Style;
 
-/// Width of the band for what has no place on the axis (pixels).
+/// Width of the band for failed settings, which have no error (pixels).
 const BAND: f64 = 34.0;
 
-/// Where the band for what failed is: beyond the errors.
+/// Side of the band for failed settings: where errors are largest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Band {
-    /// Nothing fails here.
+    /// No band.
     None,
     /// Errors grow to the right.
     Right,
@@ -30,20 +30,20 @@ pub struct Panel {
     y: Scale,
 }
 
-/// Size, title, names and strip of a panel.
+/// Size, title, axis names and band of a panel.
 pub struct PlotArea<'a> {
     /// Width and height (pixels).
     pub size: [f64; 2],
-    /// Over it.
+    /// Title above the plot.
     pub title: &'a str,
     /// Names of the axes.
     pub names: [&'a str; 2],
-    /// A band for what failed.
+    /// Position of the band for failed settings.
     pub band: Band,
 }
 
 impl Panel {
-    /// Draws the frame.
+    /// Draws the frame, the grid and the labels.
     pub fn new(frame: &PlotArea, x: Scale, y: Scale) -> Panel {
         let [width, height] = frame.size;
         let in_band = |side: Band| if frame.band == side { BAND } else { 0.0 };
@@ -81,7 +81,8 @@ impl Panel {
             px(left),
             px(top)
         );
-        // As many labels as do not touch each other, at equal distances, and none in that of the band.
+        // Draws as many labels as fit without overlap, at equal intervals, and none that would overlap the
+        // band's label.
         let end = if frame.band == Band::Right { right + 0.5 * BAND - 17.0 } else { width };
         let place = |(v, label): &(f64, String)| {
             let (at, half) = (left + x.share(*v) * (right - left), 3.5 * label.chars().count() as f64);
@@ -107,7 +108,7 @@ impl Panel {
             );
         }
         let (middle, half) = (px(0.5 * (left + right)), px(0.5 * (top + bottom)));
-        // A character is about half as wide as its line is high.
+        // A character is about half as wide as a line is high.
         let lines = wrapped(frame.names[0], ((right - left) / 5.6) as usize);
         let first = height - 10.0 - 6.5 * lines.len().saturating_sub(1) as f64;
         for (i, line) in lines.iter().enumerate() {
@@ -146,25 +147,25 @@ impl Panel {
         Panel { text, left, top, right, bottom, x, y }
     }
 
-    /// Where values are (pixels).
+    /// Position of a pair of values (pixels).
     pub fn at(&self, x: f64, y: f64) -> [f64; 2] {
         let across = self.left + self.x.share(x) * (self.right - self.left);
         [across, self.bottom - self.y.share(y) * (self.bottom - self.top)]
     }
 
-    /// Where something that failed is drawn, `place` in [0, 1] across the band.
+    /// Position of a failed setting in the band right of the frame; `place` in [0, 1] across the band.
     pub fn in_band(&self, y: f64, place: f64) -> [f64; 2] {
         let [_, down] = self.at(self.x.low, y);
         [self.right + 8.0 + place * (BAND - 14.0), down]
     }
 
-    /// Where something that failed at x is drawn in the band above the frame, `place` in [0, 1] up the band.
+    /// Position of a failed setting at x in the band above the frame; `place` in [0, 1] up the band.
     pub fn above(&self, x: f64, place: f64) -> [f64; 2] {
         let [across, _] = self.at(x, self.y.low);
         [across, self.top - 8.0 - place * (BAND - 14.0)]
     }
 
-    /// Everything below y within the frame.
+    /// Shades the part of the frame below y.
     pub fn shade_below(&mut self, y: f64) {
         let [_, up] = self.at(self.x.low, y);
         self.text += &format!(
@@ -176,7 +177,7 @@ impl Panel {
         );
     }
 
-    /// A broken line through pixels.
+    /// A polyline through these pixels.
     pub fn line(&mut self, at: &[[f64; 2]], class: &str, color: &str) {
         if at.len() > 1 {
             self.text +=
@@ -184,7 +185,7 @@ impl Panel {
         }
     }
 
-    /// An upright line at x, over the height of the frame.
+    /// A vertical line at x, over the height of the frame.
     pub fn upright(&mut self, x: f64, class: &str, title: &str) {
         let [across, _] = self.at(x, self.y.low);
         self.text += &format!(
@@ -196,7 +197,7 @@ impl Panel {
         );
     }
 
-    /// Everything left of x within the frame.
+    /// Shades the part of the frame left of x.
     pub fn shade_left(&mut self, x: f64) {
         let [across, _] = self.at(x, self.y.low);
         self.text += &format!(
@@ -208,14 +209,14 @@ impl Panel {
         );
     }
 
-    /// From one y to another at x.
+    /// A vertical bar at x between two values of y.
     pub fn bar(&mut self, x: f64, ys: [f64; 2], color: &str) {
         let [[a, b], [_, c]] = ys.map(|y| self.at(x, y));
         self.text +=
             &format!("<path class=\"bar\" stroke=\"{color}\" d=\"M{} {}V{}\"/>\n", px(a), px(b), px(c));
     }
 
-    /// A solver's marker, `r` pixels; hollow for natural order.
+    /// A solver's marker with a radius of `r` pixels; hollow for natural order.
     pub fn marker(&mut self, at: [f64; 2], r: f64, solver: &str, hollow: bool, faint: bool, title: &str) {
         let Style { color, marker } = Style::of(solver);
         let fill = if hollow { "#fff" } else { color };
@@ -227,32 +228,32 @@ impl Panel {
         );
     }
 
-    /// Text at pixels.
+    /// Text at a position in pixels.
     pub fn write(&mut self, [x, y]: [f64; 2], class: &str, text: &str) {
         self.text +=
             &format!("<text class=\"{class}\" x=\"{}\" y=\"{}\">{}</text>\n", px(x), px(y), escaped(text));
     }
 
-    /// The frame's sides (pixels): left, top, right, bottom.
+    /// Sides of the frame (pixels): left, top, right, bottom.
     pub fn sides(&self) -> [f64; 4] {
         [self.left, self.top, self.right, self.bottom]
     }
 
-    /// The whole element.
+    /// The complete SVG element.
     pub fn finish(self) -> String {
         self.text + "</svg>\n"
     }
 }
 
-/// Labels beside points, where there is room.
+/// Places labels next to points where there is room.
 #[derive(Default)]
 pub struct Labels {
     taken: Vec<[f64; 4]>,
 }
 
 impl Labels {
-    /// Where the left end of a label's baseline goes, `width` pixels wide and `size` high, beside a
-    /// point of radius `r`; none where every place is taken.
+    /// Position of the left end of a label's baseline next to a point of radius `r`; the label is `width`
+    /// pixels wide and `size` high. `None` if there is no free position.
     pub fn place(
         &mut self,
         [x, y]: [f64; 2],
@@ -280,13 +281,13 @@ impl Labels {
         own
     }
 
-    /// Keeps labels off a point of radius `r`.
+    /// Keeps labels away from a point of radius `r`.
     pub fn block(&mut self, [x, y]: [f64; 2], r: f64) {
         self.taken.push([x - r, y - r, x + r, y + r]);
     }
 }
 
-/// The markers of solvers with their names.
+/// Legend: the markers of solvers with their names.
 pub fn legend(solvers: &[&str]) -> String {
     let mut text = String::from("<p class=\"legend\">");
     for solver in solvers {

@@ -1,4 +1,4 @@
-//! Work-precision plots: time against three errors, scene by scene, with every number in a table.
+//! Work-precision plots: time against three errors, for each scene, with all numbers in a table.
 
 use super::panel::{Band, Labels, Panel, PlotArea};
 use super::scale::{Scale, number};
@@ -28,7 +28,7 @@ pub fn shown(error: f64, unit: &str) -> String {
     if unit.is_empty() || unit == "1" { number(error) } else { si(error, unit) }
 }
 
-/// Three plots and a table.
+/// Three plots and a table of one scene.
 pub fn scene(entries: &[Record]) -> String {
     let settings = fastest(entries);
     let mut text = String::from("<div class=\"panels three\">\n");
@@ -53,7 +53,7 @@ fn panel(settings: &[&Record], axis: Axis, name: &str, unit: &str) -> String {
         panel.shade_left(tolerance);
         panel.upright(tolerance, "tolerance", &format!("tolerance {}", shown(tolerance, unit)));
     }
-    // The front: no other setting beats these in both.
+    // The Pareto front: no other setting beats these in both time and error.
     let mut front: Vec<&&Record> = held().filter(|e| e.on_front(axis)).collect();
     front.sort_by(|a, b| error(b).total_cmp(&error(a)));
     let mut steps: Vec<[f64; 2]> = Vec::new();
@@ -78,7 +78,7 @@ fn panel(settings: &[&Record], axis: Axis, name: &str, unit: &str) -> String {
             panel.line(&at, if natural { "curve natural" } else { "curve" }, Style::of(solver).color);
         }
     }
-    // No label on a mark, and only the front has labels: all others are told where one points.
+    // Labels must not cover marks. Only the front has labels; all other marks have tooltips.
     let mut labels = Labels::default();
     for entry in held() {
         labels.block(panel.at(error(entry), entry.time().unwrap_or(0.0)), 4.0);

@@ -2,19 +2,19 @@
 
 use crate::lab::units::si_short;
 
-/// A range with ticks.
+/// An axis with its range and ticks.
 #[derive(Clone, Debug)]
 pub struct Scale {
     log: bool,
     pub low: f64,
     pub high: f64,
-    /// Labeled ones.
+    /// Labeled ticks.
     pub ticks: Vec<(f64, String)>,
-    /// Those between.
+    /// Unlabeled ticks in between.
     pub minor: Vec<f64>,
 }
 
-/// Most labeled ticks.
+/// Maximum number of labeled ticks.
 const MOST: usize = 7;
 
 impl Scale {
@@ -41,7 +41,7 @@ impl Scale {
             &[1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 8.0, 9.0],
             &[1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.8, 2.0, 2.2, 2.4, 2.6, 3.0],
         ];
-        // The first with enough of them; where none has, the one with most.
+        // The first set with enough ticks or, if there is none, the one with the most.
         let sets: Vec<Vec<f64>> = digits.iter().map(|d| within(d)).collect();
         let enough = sets.iter().find(|t| t.len() >= 3).cloned();
         let ticks = enough.or_else(|| sets.into_iter().max_by_key(Vec::len)).unwrap_or_default();
@@ -66,8 +66,8 @@ impl Scale {
         Scale { log: false, low: 0.0, high, ticks, minor: Vec::new() }
     }
 
-    /// An axis with ticks at these values, as many as there is room for, and at nothing else; logarithmic
-    /// where every value has a logarithm.
+    /// An axis with ticks only at these values, as many as there is room for; logarithmic if all values are
+    /// positive.
     pub fn at(values: &[f64], unit: &str) -> Scale {
         let low = values.iter().copied().fold(f64::INFINITY, f64::min).min(1e12);
         let high = values.iter().copied().fold(low, f64::max);
@@ -85,7 +85,7 @@ impl Scale {
         Scale { log, low, high, ticks, minor: Vec::new() }
     }
 
-    /// An axis with these ticks, and nothing between; logarithmic.
+    /// A logarithmic axis with ticks only at these values.
     pub fn steps(values: &[usize]) -> Scale {
         let all: Vec<f64> = values.iter().map(|&v| v as f64).collect();
         let low = all.iter().copied().fold(f64::INFINITY, f64::min).min(1e9);
@@ -94,7 +94,7 @@ impl Scale {
         Scale { log: true, low: low / 1.2, high: high * 1.2, ticks, minor: Vec::new() }
     }
 
-    /// Where a value is between the limits, in [0, 1].
+    /// Position of a value between the limits, in [0, 1].
     pub fn share(&self, value: f64) -> f64 {
         let share = match self.log {
             true => (value.max(1e-300) / self.low).ln() / (self.high / self.low).ln(),
@@ -115,7 +115,7 @@ pub fn label(value: f64, unit: &str) -> String {
     }
 }
 
-/// A plain number with few digits; powers of ten where it is very large or very small.
+/// A number with few digits, without a unit; in powers of ten if it is very large or very small.
 pub fn number(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 {

@@ -1,4 +1,4 @@
-//! Profiles, lanes, phases and iterations.
+//! Sections of the page: profiles, lanes, phases and iterations.
 
 use super::panel::{Band, Panel, PlotArea};
 use super::scale::{Scale, number};
@@ -11,7 +11,7 @@ use crate::lab::study::profile::Profile;
 use crate::lab::study::{Record, answer};
 use crate::lab::units::si;
 
-/// Performance profiles, a panel per error.
+/// Performance profiles, one panel per error.
 pub fn profiles(records: &[Record]) -> String {
     let mut text = String::from("<div class=\"panels three\">\n");
     for profile in Axis::ALL.map(|axis| Profile::of(records, axis)).iter().filter(|p| p.scenes > 0) {
@@ -24,13 +24,13 @@ pub fn profiles(records: &[Record]) -> String {
         x.low = 0.95;
         x.ticks.retain(|t| t.0 >= 1.0);
         let mut y = Scale::linear(1.0, "%");
-        // Room for lines beside each other at both ends.
+        // Margin at both ends for lines drawn next to each other.
         (y.low, y.high) = (-0.05, 1.05);
         let mut panel = Panel::new(&frame, x, y);
         for (i, (solver, ratios)) in profile.ratios.iter().enumerate() {
             let rho =
                 |f: f64| ratios.iter().filter(|&&r| r <= f).count() as f64 / profile.scenes.max(1) as f64;
-            // Lines that coincide stay visible beside each other.
+            // Lines that coincide are shifted so that all remain visible.
             let shift = 1.6 * (i as f64 - 0.5 * profile.ratios.len() as f64);
             let at = |panel: &Panel, f: f64, y: f64| {
                 let [u, v] = panel.at(f, y);
@@ -57,7 +57,7 @@ pub fn profiles(records: &[Record]) -> String {
     text + "</div>\n"
 }
 
-/// Speed-up and occupancy against lane width, a pair of panels per scene.
+/// Speed-up and occupancy against lane width, two panels per scene.
 pub fn lanes(records: &[Record]) -> String {
     let mut widths: Vec<usize> = records.iter().filter(|e| !e.is_natural()).map(|e| e.lanes).collect();
     widths.sort_unstable();
@@ -108,13 +108,13 @@ pub fn lanes(records: &[Record]) -> String {
     text + "</div>\n"
 }
 
-/// Colors of phases: muted, and unlike those of solvers by being areas in a fixed order.
+/// Colors of phases: muted. They differ from those of solvers because they fill areas in a fixed order.
 const PHASES: [&str; Phase::ALL.len()] = [
     "#332288", "#88ccee", "#bbbbbb", "#44aa99", "#999933", "#cc6677", "#ddcc77", "#aa4499", "#661100",
     "#117733", "#777777",
 ];
 
-/// Time per phase as stacked bars, a plot per scene with a bar per solver.
+/// Time per phase as stacked bars: a plot per scene, a bar per solver.
 pub fn phases(records: &[Record]) -> String {
     let mut text = String::from("<p class=\"legend\">");
     let used = |k: usize| {
@@ -190,7 +190,7 @@ pub fn phases(records: &[Record]) -> String {
     text + "</div>\n"
 }
 
-/// Sweeps over the constraints against two errors, scene by scene.
+/// Constraint sweeps against two errors, for each scene.
 pub fn iterations(records: &[Record]) -> String {
     let mut text = String::from("<div class=\"panels four\">\n");
     for scene in scenes(records) {

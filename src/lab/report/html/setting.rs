@@ -4,25 +4,26 @@ use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis};
 use crate::lab::study::{Record, answer};
 use crate::lab::units::lanes;
 
-/// Questions to a setting, which is a record at its fastest lane width.
+/// Values of a setting. A setting is represented by its record at the fastest lane width.
 pub trait Setting {
     /// Time of a step (s).
     fn time(&self) -> Option<f64>;
-    /// An error that can be drawn on a logarithmic axis.
+    /// An error, with a floor so that it can be drawn on a logarithmic axis.
     fn drawn(&self, axis: ErrorAxis) -> Option<f64>;
-    /// The most that an error may be.
+    /// The tolerance of an error.
     fn tolerance(&self, axis: ErrorAxis) -> Option<f64>;
-    /// Whether no other setting beats it in time and in that error.
+    /// Whether no other setting beats it in both time and this error.
     fn on_front(&self, axis: ErrorAxis) -> bool;
-    /// The failure and its step; none if the run holds.
+    /// The failure and its step; `None` if the run holds.
     fn broke(&self) -> Option<String>;
-    /// Whether it has no colors.
+    /// Whether it runs in a serial order instead of by colors.
     fn is_natural(&self) -> bool;
-    /// The largest of its errors in their tolerances; none if it does not hold, or missed its truth.
+    /// The largest of its errors ÷ tolerance; `None` if it does not hold or did not reach its reference
+    /// value.
     fn worst(&self) -> Option<f64>;
-    /// Budget and order or width in words.
+    /// Budget, and order or lane width, as text.
     fn words(&self) -> String;
-    /// The same in few letters.
+    /// The same, abbreviated.
     fn label(&self) -> String;
 }
 
@@ -80,7 +81,7 @@ pub fn scenes(records: &[Record]) -> Vec<&[Record]> {
     records.chunk_by(|a, b| a.scene == b.scene).collect()
 }
 
-/// Every setting of a scene at its fastest width; those that failed, at any.
+/// Every setting of a scene at its fastest width. For settings that failed, the width is arbitrary.
 pub fn fastest(scene: &[Record]) -> Vec<&Record> {
     let mut kept: Vec<&Record> = Vec::new();
     for record in scene {
@@ -96,7 +97,7 @@ pub fn fastest(scene: &[Record]) -> Vec<&Record> {
     kept
 }
 
-/// Of each solver the setting in the middle of its budgets, colored where there is such a run.
+/// The middle one of a solver's settings; of those in colored order if there are any.
 pub fn standard<'a>(scene: &'a [Record], solver: &str) -> Option<&'a Record> {
     let own: Vec<&Record> = fastest(scene).into_iter().filter(|r| r.solver == solver).collect();
     let colored: Vec<&Record> = own.iter().copied().filter(|r| !r.is_natural()).collect();

@@ -1,4 +1,4 @@
-//! A sweep in plots: time and errors against the swept value, a curve per solver.
+//! Plots of a sweep: time and errors against the swept value, a curve per solver.
 
 use super::panel::{Band, Panel, PlotArea, legend};
 use super::precision::{name, shown};
@@ -23,10 +23,10 @@ enum Shown {
 }
 
 impl Shown {
-    /// Seconds, or the error; none where there is none.
+    /// Time (s) or error; `None` if the record has none.
     fn of(self, record: &Record) -> Option<f64> {
         match self {
-            // Steps of different length are compared by what a second of the scene costs.
+            // Steps of different length are compared by their time per second of the scene.
             Shown::Time if is_dt(record) => Some(record.time()? / record.dt),
             Shown::Time => record.time(),
             Shown::Error(axis) => record.drawn(axis),
@@ -38,7 +38,7 @@ fn is_dt(record: &Record) -> bool {
     record.swept.is_some_and(|s| s.name == "dt")
 }
 
-/// Values of the sweep, ascending, each once.
+/// Values of the sweep, in ascending order and without duplicates.
 fn values(scene: &[Record]) -> Vec<f64> {
     let mut values: Vec<f64> = scene.iter().filter_map(|r| r.swept).map(|s| s.value).collect();
     values.sort_by(f64::total_cmp);
@@ -59,7 +59,7 @@ fn panels(scene: &[Record], swept: Swept) -> Vec<String> {
 
 fn panel(scene: &[Record], swept: Swept, what: Shown, unit: &str) -> String {
     let settings = fastest(scene);
-    // What the reference value is of stands over the plots.
+    // The quantity of the reference value is named above the plots.
     let name = match what {
         Shown::Error(axis) => axis.name(),
         Shown::Time if is_dt(&scene[0]) => "time per second of the scene",
@@ -73,7 +73,7 @@ fn panel(scene: &[Record], swept: Swept, what: Shown, unit: &str) -> String {
     let ys = held().filter_map(|r| what.of(r)).chain(tolerance);
     let frame = PlotArea { size: SIZE, title: "", names: [swept.name, name], band: Band::Top };
     let mut panel = Panel::new(&frame, Scale::at(&values(scene), swept.unit), Scale::log(ys, unit));
-    // Tolerances of some scenes change with the value.
+    // In some scenes the tolerance depends on the swept value.
     let same = settings.iter().all(|r| match what {
         Shown::Error(axis) => r.tolerance(axis) == tolerance,
         Shown::Time => true,
@@ -82,7 +82,7 @@ fn panel(scene: &[Record], swept: Swept, what: Shown, unit: &str) -> String {
         panel.shade_below(tolerance);
     }
     let at = |r: &Record| r.swept.map_or(0.0, |s| s.value);
-    // Solvers that fail at the same value stand side by side, three in a row.
+    // Solvers that fail at the same value are drawn next to each other, three in a row.
     let count = solvers_of(scene).len();
     let (columns, rows) = (count.min(3) as f64, count.div_ceil(3) as f64);
     let place = |i: usize| [9.0 * ((i % 3) as f64 - 0.5 * (columns - 1.0)), ((i / 3) as f64 + 0.5) / rows];
@@ -94,7 +94,7 @@ fn panel(scene: &[Record], swept: Swept, what: Shown, unit: &str) -> String {
             own.sort_by(|a, b| at(a).total_cmp(&at(b)));
             let class = if natural { "curve natural" } else { "curve" };
             let drawn = |r: &&&Record| r.broke().is_none() && what.of(r).is_some();
-            // What fails breaks the curve.
+            // A failed value interrupts the curve.
             for part in own.chunk_by(|a, b| drawn(a) && drawn(b)).filter(|part| drawn(&part[0])) {
                 let line: Vec<[f64; 2]> =
                     part.iter().filter_map(|r| Some(panel.at(at(r), what.of(r)?))).collect();
@@ -132,7 +132,7 @@ fn panel(scene: &[Record], swept: Swept, what: Shown, unit: &str) -> String {
     panel.finish()
 }
 
-/// Every scene: plots and the table.
+/// Plots and table of every scene.
 pub fn section(records: &[Record]) -> String {
     let Some(swept) = records.iter().find_map(|r| r.swept) else { return String::new() };
     let mut text = legend(&solvers_of(records));
@@ -155,13 +155,13 @@ fn reference(scene: &[Record]) -> String {
     scene.iter().find_map(|r| r.truth).map_or(String::new(), |t| format!("; reference value: {}", t.quantity))
 }
 
-/// `sweep.svg`: the same plots in a picture of their own, a row per scene.
+/// `sweep.svg`: the same plots as a separate picture, a row per scene.
 pub fn svg(records: &[Record]) -> String {
     let Some(swept) = records.iter().find_map(|r| r.swept) else { return String::new() };
     const HEAD: f64 = 30.0;
     let rows: Vec<(String, Vec<String>)> =
         scenes(records).into_iter().map(|s| (s[0].scene.clone() + &reference(s), panels(s, swept))).collect();
-    // Two side by side can still be read on a telephone.
+    // Two columns are still readable on a phone.
     const COLUMNS: usize = 2;
     let solvers = solvers_of(records);
     let [width, height] = SIZE;
@@ -207,12 +207,12 @@ pub fn svg(records: &[Record]) -> String {
     text + "</svg>\n"
 }
 
-/// Width of a solver in the legend (pixels).
+/// Width of a solver's entry in the legend (pixels).
 fn entry_width(solver: &str) -> f64 {
     30.0 + 7.5 * solver.chars().count() as f64
 }
 
-/// Solvers in rows of a legend that is so wide (pixels).
+/// Solvers in rows of a legend of this width (pixels).
 fn legend_rows(solvers: &[&'static str], width: f64) -> Vec<Vec<&'static str>> {
     let mut rows: Vec<Vec<&'static str>> = vec![Vec::new()];
     let mut x = 16.0;
@@ -229,7 +229,7 @@ fn legend_rows(solvers: &[&'static str], width: f64) -> Vec<Vec<&'static str>> {
     rows
 }
 
-/// The rules of the page that concern plots, light and dark, and none that size them to their page.
+/// The page's CSS rules for plots, light and dark, without those that set their size on the page.
 fn plot_rules() -> String {
     let css = include_str!("page.css");
     let of = |start: &str| css.lines().filter(|l| l.starts_with(start)).collect::<Vec<_>>().join("\n");
@@ -260,7 +260,7 @@ mod tests {
             at(1.0, record(8, 1, 11.0, 1e-3)),
         ];
         let made = panels(&records, records[0].swept.unwrap());
-        // Time, penetration, residual; no reference value.
+        // Time, penetration and residual; there is no reference value.
         assert_eq!(made.len(), 3);
         for panel in &made {
             assert_eq!(panel.matches("class=\"curve\"").count(), 2, "{panel}");

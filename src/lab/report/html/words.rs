@@ -1,4 +1,4 @@
-//! The answer in words: what to use on each scene, and a ranking over all of them.
+//! The answer as text: what to use on each scene, and a ranking over all scenes.
 
 use super::precision::shown;
 use super::scale::number;
@@ -61,7 +61,7 @@ fn sentences(ranking: &Ranking, answers: &[Answer], records: &[Record], steps: O
     if !none.is_empty() {
         text += &format!("<br/>\nNothing that ran is good enough on {}.", escaped(&none.join(", ")));
     }
-    // A line that begins with a small letter goes on with the one before.
+    // A line that begins with a small letter continues the previous one.
     let mut lines: Vec<String> = Vec::new();
     for line in warnings(records, steps).lines() {
         match lines.last_mut() {
@@ -75,7 +75,7 @@ fn sentences(ranking: &Ranking, answers: &[Answer], records: &[Record], steps: O
     text
 }
 
-/// Settings that pass their run and fail later.
+/// Settings that are good enough in their run but fail later.
 fn later_lines(records: &[Record]) -> Vec<String> {
     fails_later(records).iter().map(|(r, why)| later_line(r, why) + ".").collect()
 }
@@ -127,7 +127,7 @@ fn row(answer: &Answer, records: &[Record]) -> String {
     )
 }
 
-/// Where a scene's plots are on the page.
+/// Anchor of a scene's plots on the page.
 pub fn anchor(scene: &str) -> String {
     let safe = scene.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' });
     format!("scene-{}", safe.collect::<String>())

@@ -1,26 +1,30 @@
-//! Chains of joints that hang from what does not move, solved at once: pendulums, ropes, bridges, beams.
+//! Chains of joints that hang from immovable bodies, solved directly: pendulums, ropes, bridges, beams.
 //!
 //! # Problem
 //!
-//! Gauss–Seidel needs n² sweeps along a chain of n links, times the ratio of masses. But the rigid rows of a chain couple each link
-//! to the one before and the one after alone: they are a block tridiagonal system, which is solved in a time that grows with n. Per
-//! substep of h, with J, C and v at its start and K = J M⁻¹ Jᵀ,
+//! Gauss–Seidel needs n² sweeps for a chain of n links, times the mass ratio. But the rigid rows of a chain
+//! couple each link only to the one before and the one after. They form a block tridiagonal system, which is
+//! solved in a time proportional to n. Per substep of h, with J, C and v at its start and K = J M⁻¹ Jᵀ,
 //!
 //! ```text
 //! K λ = −(J v + C/h),      v ← v + M⁻¹ Jᵀ λ
 //! ```
 //!
-//! The errors are gone at the end of the substep to first order. The impulses λ are whole: these rows need no warm start.
+//! The errors are gone at the end of the substep, to first order. λ are the whole impulses: these rows need
+//! no warm start.
 //!
-//! Sweeps of contacts, motors and limits move the links after that. Chains that they have moved are solved again, before positions
-//! follow; and once more without errors, K λ' = −J v, after the relaxing sweeps. Otherwise the next substep finds as errors what sweeps
-//! did in this one, and removes them at the rate 1/h, against the same contacts and motors. A chain that the first sweeps have not moved,
-//! to the bit, is solved once. Contacts of beams do not feel the mass of one plank but what the beam lends to it, see `system/apparent.rs`.
+//! Sweeps over contacts, motors and limits move the links after that. Chains that these sweeps have moved are
+//! solved again before positions are integrated, and once more without errors, K λ' = −J v, after the
+//! relaxing sweeps. Otherwise the next substep would find the effects of the sweeps as errors, and remove
+//! them at the rate 1/h against the same contacts and motors. A chain whose velocities the first sweeps have
+//! left bit-identical is solved once. Contacts with a beam do not use the mass of one plank but its apparent
+//! mass as a part of the beam; see `system/apparent.rs`.
 //!
 //! # Chains
 //!
-//! Rows are oriented along the chain: L is the body toward the place where the chain hangs, R the one away from it, and
-//! J v = d·(v_R − v_L) + s_R ω_R − s_L ω_L. Of link i and the next one, j, which share the body R,
+//! Rows are oriented along the chain: L is the body toward the place where the chain hangs, R the one away
+//! from it, and J v = d·(v_R − v_L) + s_R ω_R − s_L ω_L. For link i and the next one, j, which share the body
+//! R,
 //!
 //! ```text
 //! K_ii = (m_L⁻¹ + m_R⁻¹) d dᵀ + I_L⁻¹ s_L s_Lᵀ + I_R⁻¹ s_R s_Rᵀ,     K_ij = −(m_R⁻¹ d_i d_jᵀ + I_R⁻¹ s_R,i s_L,jᵀ)
@@ -28,37 +32,42 @@
 //!
 //! # Tension
 //!
-//! A force F on the arm r of a body turns it by r × F, which falls by r·F per radian. So a chain under a tension T swings across, its links
-//! of mass m and length l at up to ω² = 4 T/(m l), and T has no bound where a chain is straight between two pins. An explicit step bears
-//! ω h < 2. Implicit Euler bears any: with the torque τ at the start of the substep and the stiffness Σ r·F of all hinges of the body,
+//! A force F on the arm r of a body exerts a torque r × F, which falls by r·F per radian. So a chain under a
+//! tension T swings sideways. Its links of mass m and length l reach up to ω² = 4 T/(m l), and T has no bound
+//! if a chain is straight between two pins. An explicit step is stable for ω h < 2. Implicit Euler is always
+//! stable: with the torque τ at the start of the substep and the stiffness Σ r·F of all hinges of the body,
 //!
 //! ```text
 //! I (ω⁺ − ω) = h (τ − h ω⁺ Σ r·F),      (1 + x) I ω⁺ = I ω + h τ,      x = (h²/I) Σ r·F
 //! ```
 //!
-//! but damps what it slows. So only what is beyond x = 1 is taken implicitly, e = max(0, x − 1): ω at the start of the substep and I⁻¹ in
-//! these rows are divided by 1 + e. F is that of the substep before. Links that are rods have x = 3 (ω h)², and x = 1 at ω h = 0.58; slower
-//! swings keep their energy.
+//! But it damps the motion that it slows. So only the part beyond x = 1 is implicit, e = max(0, x − 1): ω at
+//! the start of the substep and I⁻¹ in these rows are divided by 1 + e. F is that of the substep before.
+//! Links that are rods have x = 3 (ω h)², and x = 1 at ω h = 0.58; slower swings keep their energy.
 //!
-//! A straight chain between two pins has a row more along it than its bodies have coordinates, so K has no inverse. Joints of all chains
-//! give way, C = −γ K_ii λ h with γ = 3·10⁻⁵: K_ii is multiplied by 1 + γ, and a second solve has γ K_ii λ of the first on its right side.
+//! A straight chain between two pins has one more row along it than its bodies have coordinates, so K has no
+//! inverse. Therefore the joints of all chains yield, C = −γ K_ii λ h with γ = 3·10⁻⁵: K_ii is multiplied by
+//! 1 + γ, and a second solve has γ K_ii λ of the first on its right side.
 //!
 //! # A joint alone
 //!
-//! With an arm r that turns at ω, C grows by h J v − ½ h² ω² r in a substep; the second term is left over, and C/h takes it out one substep
-//! later. So at t_n, between the substeps with ω_n−1 and ω_n, rows hold J v = ½ h ω²_n−1 r, half a substep too late, which takes energy: 1 %
-//! of a pendulum's from 120° in a minute, with two substeps. With half of the term on the right side,
+//! With an arm r that turns at ω, C grows by h J v − ½ h² ω² r in a substep. The second term remains, and C/h
+//! removes it one substep later. So at t_n, between the substeps with ω_n−1 and ω_n, rows hold
+//! J v = ½ h ω²_n−1 r, half a substep too late. This costs energy: a pendulum that starts at 120° loses 1 %
+//! in a minute, with two substeps. With half of the term on the right side,
 //!
 //! ```text
 //! J v = −C/h + ¼ h ω²_n−1 r = ½ h (1.5 ω²_n−1 − 0.5 ω²_n−2) r
 //! ```
 //!
-//! J v is that of ω² at t_n to first order: symmetric in time, and half of the gap stays. ω is what the last substep has left, or what the body
-//! has now if that is slower: contacts turn a welded plank until its weld is solved. This is for chains of one link; longer ones would keep more
-//! of their energy as well, but some gain some (`papers/shim.md`).
+//! J v is that of ω² at t_n to first order: symmetric in time, and half of the gap remains. ω is the value
+//! after the last substep, or the present value of the body if that is slower: contacts turn a welded plank
+//! until its weld is solved. This applies to chains of one link. Longer ones would keep more of their energy
+//! as well, but some gain energy (`papers/shim.md`).
 //!
-//! No body of a chain has a third rigid joint; one joint to what does not move is a chain. All else is left to sweeps: the bodies of ragdolls
-//! differ little in mass. `system` solves the chains of a scene as one system, whose blocks between two chains are zero.
+//! No body of a chain has a third rigid joint. One joint to an immovable body is a chain. Everything else is
+//! left to sweeps: the bodies of ragdolls differ little in mass. `system` solves the chains of a scene as one
+//! system, in which the blocks between two chains are zero.
 
 pub(super) mod records;
 mod system;
@@ -75,41 +84,42 @@ use system::ChainSystem;
 /// No body.
 const NONE: u32 = u32::MAX;
 
-/// Chains of joints, and room to solve them.
+/// Chains of joints, and the memory to solve them.
 #[derive(Clone, Debug, Default)]
 pub struct Chains {
-    /// Ends of all joints as they were when the chains were found. `[joints]`
+    /// Ends of all joints when the chains were found. `[joints]`
     ends: Vec<[u32; 2]>,
-    /// Whether bodies move by impulses, as they did then. `[rows]`
+    /// Whether impulses moved the bodies at that time. `[rows]`
     moves: Vec<bool>,
-    /// By type, in the order of their slots.
+    /// Links by type, in the order of their slots.
     links: Vec<Vec<ChainLink>>,
     system: ChainSystem,
     search: ChainSearch,
     /// Whether contacts, or rows that are not rigid, push a body. `[rows]`
     loaded: Vec<bool>,
-    /// Share of its inverse mass that a body has for these. `[rows]`
+    /// Share of its inverse mass that a body has for these contacts and rows. `[rows]`
     shares: Vec<f32>,
     masses: ScaledMasses,
 }
 
-/// Room to find chains.
+/// Memory to find chains.
 #[derive(Clone, Debug, Default)]
 struct ChainSearch {
     /// Where joints of a body begin in `joined`. `[bodies + 1]`
     starts: Vec<u32>,
     /// Joints by body.
     joined: Vec<u32>,
-    /// Type and number of each joint.
+    /// Type of each joint, and its index in the type.
     places: Vec<[u32; 2]>,
-    /// Its ends; [`NONE`] for what does not move.
+    /// Ends of each joint; [`NONE`] for a body that does not move.
     ends: Vec<[u32; 2]>,
-    /// Links of all chains, one after the other: joint, body away from where it hangs, and number of the chain.
+    /// Links of all chains, one after the other: joint, body R (away from where the chain hangs), and number
+    /// of the chain.
     found: Vec<(u32, u32, usize)>,
 }
 
 impl Chains {
-    /// Finds the chains among the joints of these types, where joints or bodies have changed.
+    /// Finds the chains among the joints of these types, if joints or bodies have changed.
     pub fn find(&mut self, types: &[Joined], rows: &[BodyRow]) {
         let is_same = self.moves.len() == rows.len()
             && self.moves.iter().zip(rows).all(|(&moves, row)| moves == moves_by_impulses(row))
@@ -127,7 +137,7 @@ impl Chains {
         self.system.note(rows);
     }
 
-    /// Gives links their places in the system.
+    /// Assigns links to slots of the system.
     fn lay_out(&mut self, types: &[Joined]) {
         let Chains { links, system, search, .. } = self;
         let type_of = |joint: u32| &types[search.places[joint as usize][0] as usize].kind;
@@ -151,19 +161,20 @@ impl Chains {
         links.iter_mut().for_each(|links| links.sort_unstable_by_key(|link| link.slot));
     }
 
-    /// Whether there is none.
+    /// Whether there are no chains.
     pub fn is_empty(&self) -> bool {
         self.system.is_empty()
     }
 
-    /// Says to types which joints are links, which sweeps leave alone.
+    /// Marks the joints that are links in their types, so that sweeps skip their rigid rows.
     pub fn set_aside(&self, types: &mut [Joined], poses: &[PoseRow]) {
         for (joined, links) in types.iter_mut().zip(&self.links) {
             joined.kind.link(links, poses);
         }
     }
 
-    /// Finds the apparent masses that bodies have for contacts of these pairs, of bodies of about `length_unit` (m); none if all are whole.
+    /// Finds the apparent masses of bodies for contacts of these pairs. `None` if all have their whole mass.
+    /// `length_unit`: size of typical bodies (m).
     pub fn share_masses(
         &mut self,
         types: &mut [Joined],
@@ -184,19 +195,19 @@ impl Chains {
         self.lends().then_some((&mut self.masses, &self.shares))
     }
 
-    /// Whether some have apparent masses for contacts.
+    /// Whether some bodies have apparent masses for contacts.
     pub fn lends(&self) -> bool {
         self.system.lends()
     }
 
-    /// Notes velocities before warm starts, where there are such masses.
+    /// Notes velocities before warm starts, if some bodies have apparent masses.
     pub fn note(&mut self, rows: &[BodyRow]) {
         if self.lends() {
             self.system.note(rows);
         }
     }
 
-    /// Gives bodies their masses again.
+    /// Restores the masses of bodies.
     pub fn restore_masses(&mut self, rows: &mut [BodyRow]) {
         if self.lends() {
             self.masses.scale(rows, |_| 1.0);
@@ -213,8 +224,8 @@ impl Chains {
         }
     }
 
-    /// Changes velocities so that the rows hold at the end of the substep of `h` (s), of bodies of about `length_unit` (m); whether
-    /// there was something to solve.
+    /// Changes velocities so that the rows hold at the end of the substep of `h` (s). `length_unit`: size of
+    /// typical bodies (m). Returns whether there was something to solve.
     pub fn solve(
         &mut self,
         types: &mut [Joined],
@@ -240,15 +251,15 @@ impl Chains {
         true
     }
 
-    /// Bytes that [`Self::solve`] reads and writes, without numbers of types.
+    /// Bytes that [`Self::solve`] reads and writes, without the numbers of types.
     pub fn traffic(&self) -> [f64; 2] {
-        // Anchors, two indices and both bodies make rows.
+        // Rows are made from anchors, two indices and both bodies.
         let [read, written] = self.system.traffic();
         let rows = 4 * (ANCHORS + 2) + 2 * size_of::<BodyRow>();
         [read + (self.system.slots() * rows) as f64, written]
     }
 
-    /// Types take over the impulses.
+    /// Copies the impulses to the types.
     pub fn give_impulses(&self, types: &mut [Joined]) {
         for (joined, links) in types.iter_mut().zip(&self.links) {
             if !links.is_empty() {
@@ -285,13 +296,13 @@ impl ChainSearch {
         &self.joined[from..to]
     }
 
-    /// Finds all chains, from the first joint of each that hangs from what does not move.
+    /// Finds all chains, each from a joint to an immovable body.
     fn find(&mut self) {
         self.found.clear();
         let mut chains = 0;
         for joint in 0..self.ends.len() as u32 {
             let [a, b] = self.ends[joint as usize];
-            // A chain that hangs at both ends is found from the joint that comes first.
+            // A chain that hangs at both ends is found from the joint with the lower number.
             if (a == NONE) != (b == NONE) {
                 let from = self.found.len();
                 let last = self.follow(joint, if a == NONE { b } else { a }, chains);
@@ -304,8 +315,8 @@ impl ChainSearch {
         }
     }
 
-    /// Lists the links of a chain from its `first` joint and that one's `body` on; the last joint if it hangs from what does not move,
-    /// else the first; none where there is no chain.
+    /// Lists the links of a chain, from its `first` joint and the `body` of that joint on. Returns the last
+    /// joint if the chain also ends at an immovable body, otherwise the first. `None` if there is no chain.
     fn follow(&mut self, first: u32, mut body: u32, chain: usize) -> Option<u32> {
         let mut joint = first;
         loop {
@@ -315,7 +326,7 @@ impl ChainSearch {
             }
             joint = match *self.joints_of(body) {
                 [_] => return Some(first),
-                // The other one.
+                // The other joint.
                 [one, other] => one ^ other ^ joint,
                 _ => return None,
             };
@@ -344,7 +355,7 @@ impl ChainSearch {
         }
         joined.clear();
         joined.resize(starts[moves.len()] as usize, 0);
-        // Filled from behind, so that starts end where they began.
+        // Filled backward: the last place of each body that is filled is its start.
         let mut next: Vec<u32> = starts[1..].to_vec();
         for (joint, pair) in ends.iter().enumerate().rev() {
             for &body in pair.iter().filter(|&&body| body != NONE) {

@@ -1,4 +1,4 @@
-//! Links of one type of joints: what they hold through a step, and their rows.
+//! Links of one type of joint: their data during a step, and their rows.
 
 use crate::engine::constraints::joints::rows::{Besides, Jacobian, JointPair, JointPass, RowLaw};
 use crate::engine::constraints::joints::{ANCHORS, JointType, Joints, placed_anchors, write_velocities};
@@ -10,29 +10,29 @@ use crate::engine::narrowphase::lanes::PoseRow;
 use std::ops::{Deref, DerefMut};
 use wide::f32x8;
 
-/// Fastest speed at which the error of a joint is removed (length units or rad per second).
+/// Speed limit for removing the error of a joint (length units or rad per second).
 const MOST_SPEED: f32 = 10.0;
 
 /// Links of one type, in batches of one group each.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Linked {
-    /// They are solved as links now, and not by sweeps.
+    /// Whether they are now solved as links instead of by sweeps.
     active: bool,
-    /// In the order of their slots.
+    /// Links in the order of their slots.
     links: Vec<ChainLink>,
-    /// The row of no body.
+    /// The inert row.
     inert: u32,
-    /// Of each batch.
+    /// Group of each batch.
     groups: Vec<u32>,
-    /// Joints, and any where there is no link. `[batches × lanes]`
+    /// Joint in each lane; any joint where there is no link. `[batches × lanes]`
     joints: Indices,
-    /// a and b, or the inert one. `[batches × lanes]`
+    /// Bodies a and b, or the inert one. `[batches × lanes]`
     bodies: [Indices; 2],
-    /// 1 if b is away from where the chain hangs, −1 if a is; 0 where there is no link. `[batches]`
+    /// 1 if b is body R (away from where the chain hangs), −1 if a is; 0 where there is no link. `[batches]`
     ways: Vec<f32x8>,
     /// Anchors at the start of the step, and numbers. `[batches × (ANCHORS + numbers)]`
     records: Vec<f32x8>,
-    /// Impulses: zeros, for passes that read none. `[kept]`
+    /// Zeros, as impulses for passes that do not read any. `[kept]`
     kept: Vec<f32x8>,
     /// Whether a joint is a link. `[joints]`
     aside: Vec<bool>,
@@ -50,7 +50,7 @@ impl Linked {
         self.aside[joint as usize]
     }
 
-    /// How many links there are.
+    /// Number of links.
     pub(crate) fn count(&self) -> usize {
         self.links.len()
     }
@@ -64,7 +64,7 @@ impl Linked {
 }
 
 impl<T: JointType> Joints<T> {
-    /// Takes these joints, in the order of their slots, for links from now on, and no others.
+    /// Makes these joints, given in the order of their slots, the only links from now on.
     pub(crate) fn take_links(&mut self, links: &[ChainLink], poses: &[PoseRow]) {
         self.linked.active = !links.is_empty();
         if links.is_empty() {
@@ -91,7 +91,7 @@ impl<T: JointType> Joints<T> {
         }
     }
 
-    /// Lists links in batches. `inert`: the row of no body.
+    /// Builds the batches of links. `inert`: the inert row.
     fn list_links(&mut self, links: &[ChainLink], inert: u32) {
         self.linked = Linked { active: true, inert, links: links.to_vec(), ..Linked::default() };
         let Linked { groups, joints, bodies, ways, records, kept, aside, .. } = &mut self.linked;
@@ -117,7 +117,7 @@ impl<T: JointType> Joints<T> {
         records.resize(groups.len() * (ANCHORS + T::numbers(self.form)), f32x8::ZERO);
     }
 
-    /// Writes the rows of the links as bodies are now.
+    /// Writes the rows of the links at the present state of bodies.
     pub(crate) fn write_links(&mut self, rows: &[BodyRow], by: LinkRule, to: &mut LinkRows) {
         let Linked { groups, bodies: [a, b], ways, records, kept, .. } = &mut self.linked;
         let bodies = batches(a).zip(batches(b));
@@ -131,12 +131,12 @@ impl<T: JointType> Joints<T> {
         }
     }
 
-    /// Whether joints have rigid rows and no others.
+    /// Whether joints have only rigid rows.
     pub(crate) fn rigid_alone(&self) -> bool {
         self.rigid.is_some_and(|[_, rows]| rows == T::kept(self.form))
     }
 
-    /// As [`Self::pass`] over velocities, without the rigid rows of links.
+    /// As [`Self::pass`] over velocities, but skips the rigid rows of links.
     #[inline(never)]
     pub(crate) fn pass_besides<L: Lanes, P: JointPass<L> + DerefMut>(
         &self,
@@ -178,7 +178,7 @@ impl<T: JointType> Joints<T> {
         }
     }
 
-    /// Records take up impulses of the rigid rows of links.
+    /// Copies the impulses of the rigid rows of links to the records.
     pub(crate) fn take_up<L: Lanes>(&self, on: TypeInput<'_>) {
         let Some([place, rows]) = self.rigid.filter(|_| self.linked.is_active()) else { return };
         let (first, stride, kept) = (self.first_kept() + place, self.stride(), T::kept(self.form));
@@ -217,12 +217,12 @@ impl<T: JointType> Joints<T> {
     }
 }
 
-/// A list batch by batch.
+/// The batches of a list.
 fn batches(list: &Indices) -> impl Iterator<Item = LaneIndex<'_, [u32; LINK_LANES]>> {
     list.list().batches()
 }
 
-/// The lanes with a link, and its joint.
+/// The lanes with a link, and their joints.
 fn links_of<'a>(joints: &'a [u32; LINK_LANES], way: &'a f32x8) -> impl Iterator<Item = (usize, &'a u32)> {
     joints.iter().enumerate().filter(|&(lane, _)| way.as_array()[lane] != 0.0)
 }
@@ -259,7 +259,8 @@ impl JointPass<f32x8> for LinkPass<'_> {
         let (way, inv_h, unit) = (*way, f32x8::splat(by.inv_h), f32x8::splat(by.length_unit));
         let most = f32x8::splat(MOST_SPEED) * unit;
         let is_link = way * way;
-        // Selected by products: of selections the compiler makes masked stores, which took more than half of this pass on Zen.
+        // Selected by products: for selections, the compiler makes masked stores, which took more than half
+        // of this pass on Zen.
         let others = f32x8::ONE - is_link;
         let set = |to: &mut f32x8, value: f32x8| *to = Lanes::mul_add(is_link, value, others * *to);
         let square = error.iter().zip(&j).fold(f32x8::ZERO, |sum, (&x, j)| {

@@ -2,9 +2,10 @@
 //!
 //! # Partition
 //!
-//! The n links of a scene, chain after chain, are cut into eight runs of m, one for each lane. With the blocks D (diagonal, K_ii), C
-//! (to the next link) and E (to the last link of the lane before, which elimination fills in; at first that of the lane's first
-//! link), each lane eliminates all of its links but the last, in the order of their run (`wang1981`):
+//! The n links of a scene, chain after chain, are divided into eight runs of m links, one for each lane. The
+//! blocks of a link are D (diagonal, K_ii), C (to the next link) and E (to the last link of the lane before).
+//! E is at first that of the lane's first link; elimination fills in the others. Each lane eliminates all of
+//! its links but the last, in the order of their run (`wang1981`):
 //!
 //! ```text
 //! X = D⁻¹ C,   Y = D⁻¹ E,   z = D⁻¹ b
@@ -12,23 +13,26 @@
 //! D'' ← D'' − Eᵀ Y,                   b'' ← b'' − Eᵀ z       of the last link of the lane before
 //! ```
 //!
-//! and, once their last links are known, λ = z − X λ' − Y λ''.
+//! and, once the last links are known, λ = z − X λ' − Y λ''.
 //!
 //! # Last links
 //!
-//! What is left, one link a lane, is solved by cyclic reduction in three steps (`hockney1965`). With F the block to the lane d on, the
-//! transposed E of that lane, and p, q the lanes d before and d on,
+//! The remaining system has one link per lane. It is solved by cyclic reduction in three steps
+//! (`hockney1965`). With F the block to the lane d after, which is the transposed E of that lane, and p, q
+//! the lanes d before and d after,
 //!
 //! ```text
 //! D ← D − E D_p⁻¹ Eᵀ − F D_q⁻¹ Fᵀ,     b ← b − E D_p⁻¹ b_p − F D_q⁻¹ b_q,     E ← −E D_p⁻¹ E_p       d = 1, 2, 4
 //! ```
 //!
-//! Both need that D can be inverted; K is positive definite, and so are its Schur complements. The order is that of the links,
-//! whatever the width of the step: the same bits at any. A row that moves nothing, or is none, has 1 on the diagonal and no impulse.
+//! Both need an invertible D. K is positive definite, and so are its Schur complements. The order of
+//! operations is that of the links, so the result has the same bits at any width of the step. A row that
+//! moves nothing, or is not in use, has 1 on the diagonal and no impulse.
 //!
-//! A link of two rows takes some 110 multiplications, eight of them at a time; what waits for each other is m
-//! inverses of D. A bridge of 160 links takes 1 µs a substep, and 0.8 µs for its rows, 11 ns a link (AVX2).
-//! In `f64`, which gains nothing but the last tenth of a micrometer, its steps take 1.7 times as long.
+//! A link of two rows takes about 110 multiplications, eight of them at a time. The longest chain of
+//! dependent operations is m inverses of D. A bridge of 160 links takes 1 µs per substep, and 0.8 µs for its
+//! rows, 11 ns per link (AVX2). In `f64`, its steps take 1.7 times as long, and the only gain is the last
+//! tenth of a micrometer.
 
 mod apparent;
 mod blocks;
@@ -44,37 +48,37 @@ use wide::f32x8;
 /// The links of all chains.
 #[derive(Clone, Debug, Default)]
 pub struct ChainSystem {
-    /// Links of all chains.
+    /// Number of links of all chains.
     links: usize,
-    /// Links in a lane; m.
+    /// Links per lane, m.
     groups: usize,
-    /// Rows of a link.
+    /// Rows per link.
     size: usize,
     rows: LinkRows,
     impulses: LinkImpulses,
     /// Body R of each slot, or the inert one. `[groups × lanes]`
     bodies: Indices,
-    /// Its velocity when its chain was solved last (m/s, rad/s). `[groups]`
+    /// Velocity of body R when its chain was last solved (m/s, rad/s). `[groups]`
     velocities: Vec<[f32x8; 3]>,
-    /// I⁻¹ Σ r·λ of its hinges in this substep (1/s). `[groups]`
+    /// I⁻¹ Σ r·λ over the hinges of body R in this substep (1/s). `[groups]`
     pulls: Vec<f32x8>,
-    /// 1 + e of it. `[groups]`
+    /// 1 + e of body R. `[groups]`
     slowing: Vec<f32x8>,
-    /// Some is above 1.
+    /// Whether some of them are above 1.
     any_slowed: bool,
     apparent: Apparent,
     /// Chain of each slot. `[groups × lanes]`
     chains: Vec<u32>,
-    /// Whether something has moved a chain since it was solved. `[chains]`
+    /// Whether a chain has been moved since it was solved. `[chains]`
     moved: Vec<bool>,
     any_moved: bool,
-    /// 1 for links that are all of their chain, else 0. `[groups]`
+    /// 1 for links that are their whole chain, otherwise 0. `[groups]`
     alone: Vec<f32x8>,
-    /// ¼ h ω² of their bodies R (1/s), else 0. `[groups]`
+    /// ¼ h ω² of the bodies R of these links (1/s), otherwise 0. `[groups]`
     turning: Vec<f32x8>,
-    /// 1 for links that are solved now, 0 for others. `[groups]`
+    /// 1 for links that are solved now, otherwise 0. `[groups]`
     taken: Vec<f32x8>,
-    /// X, Y and z: 2 size² + size numbers.
+    /// X, Y and z of each link: 2 size² + size numbers.
     eliminated: LinkGroups<f32x8>,
 }
 
@@ -86,16 +90,16 @@ const GIVE: f32 = 3e-5;
 pub enum ChainStage {
     /// Before the sweeps: all chains.
     Begin,
-    /// After them: chains that they have moved.
+    /// After the sweeps: chains that they have moved.
     Again,
     /// After the relaxing sweeps: the same chains, without errors.
     Relax,
 }
 
 impl ChainSystem {
-    /// Makes room for so many links of `size` rows at most.
+    /// Allocates memory for `links` links of at most `size` rows.
     pub fn begin(&mut self, links: usize, size: usize) {
-        // One row is solved as two.
+        // A single row is solved as two.
         let size = size.max(2);
         let groups = links.div_ceil(LINK_LANES);
         (self.links, self.groups, self.size) = (links, groups, size);
@@ -121,7 +125,7 @@ impl ChainSystem {
         i % self.groups * LINK_LANES + i / self.groups
     }
 
-    /// Says how many links each chain has, from the first link on.
+    /// Sets the number of links of each chain, from the first link on.
     pub fn set_chains(&mut self, counts: impl Iterator<Item = usize>) {
         let mut i = 0;
         for (chain, count) in counts.enumerate() {
@@ -136,13 +140,13 @@ impl ChainSystem {
         }
     }
 
-    /// Sets the bodies away from where chains hang, slot by slot, as many as there are slots.
+    /// Sets body R of each slot.
     pub fn set_bodies(&mut self, bodies: &[u32]) {
         self.bodies.clear();
         self.bodies.extend(bodies);
     }
 
-    /// Takes velocities as they are for those that a solve has left.
+    /// Notes the present velocities as those after a solve.
     pub fn note(&mut self, rows: &[BodyRow]) {
         for k in 0..self.groups {
             let velocity = velocity_of(rows, self.bodies_of(k));
@@ -150,7 +154,7 @@ impl ChainSystem {
         }
     }
 
-    /// Slots: links, and lanes without one.
+    /// Number of slots: links, and lanes without one.
     pub fn slots(&self) -> usize {
         self.groups * LINK_LANES
     }
@@ -160,17 +164,18 @@ impl ChainSystem {
         self.groups == 0
     }
 
-    /// For types to fill.
+    /// The rows, which the joint types fill.
     pub fn rows(&mut self) -> &mut LinkRows {
         &mut self.rows
     }
 
-    /// After [`Self::solve`].
+    /// The impulses after [`Self::solve`].
     pub fn impulses(&self) -> &LinkImpulses {
         &self.impulses
     }
 
-    /// Begins a substep of `h` (s), from no impulses: slows what those of the last one pull straight.
+    /// Begins a substep of `h` (s) with zero impulses. Slows the bodies that the impulses of the last substep
+    /// pull straight.
     pub fn begin_substep(&mut self, rows: &mut [BodyRow], h: f32) {
         self.impulses.clear();
         if std::mem::replace(&mut self.any_moved, false) {
@@ -187,7 +192,7 @@ impl ChainSystem {
             }
             let bodies = self.bodies.list().batch(k);
             let mut velocity = velocity_of(rows, bodies);
-            // What contacts or callers have stopped since does not turn.
+            // Contacts or callers may have stopped the body since.
             let [.., before] = self.velocities[k];
             let slower = before.abs().min(velocity[W].abs());
             self.turning[k] = alone * f32x8::splat(0.25 * h) * slower * slower;
@@ -200,7 +205,8 @@ impl ChainSystem {
         }
     }
 
-    /// Finds the chains with a body that has changed its velocity since they were solved. These are solved from now on in this substep.
+    /// Finds the chains in which a body has changed its velocity since they were solved. Only these are
+    /// solved in the rest of this substep.
     pub fn find_moved(&mut self, rows: &[BodyRow]) {
         for k in 0..self.groups {
             let velocity = velocity_of(rows, self.bodies_of(k));
@@ -221,12 +227,12 @@ impl ChainSystem {
         }
     }
 
-    /// Whether there are such chains.
+    /// Whether [`Self::find_moved`] has found any.
     pub fn any_moved(&self) -> bool {
         self.any_moved
     }
 
-    /// Finds the impulses that are missing and gives them to bodies.
+    /// Finds the missing impulses and applies them to bodies.
     pub fn solve(&mut self, rows: &mut [BodyRow], stage: ChainStage) {
         match self.size {
             2 => self.solve_rows::<2>(rows, stage),
@@ -239,14 +245,14 @@ impl ChainSystem {
         let (last, [of_left, of_right]) = (self.groups - 1, [5 * N + 2, 5 * N + 3]);
         for (k, &slowing) in self.slowing.iter().enumerate() {
             self.rows.group_mut(k)[of_right] /= slowing;
-            // 1 where no lane is before.
+            // 1 where there is no lane before.
             let of_first = || f32x8::ONE + up::<1>(slowing - f32x8::ONE);
             let (next, slowing) = if k < last { (k + 1, slowing) } else { (0, of_first()) };
             self.rows.group_mut(next)[of_left] /= slowing;
         }
     }
 
-    /// The diagonal block of a link and its right side.
+    /// Diagonal block and right side of a link.
     #[inline(always)]
     fn diagonal<const N: usize>(
         &self,
@@ -344,12 +350,12 @@ impl ChainSystem {
             self.give(k, [&here, &next], [&impulse, &of_next], rows);
             next = here;
         }
-        // Of lanes' last links, the next are the first ones of the lanes after.
+        // After the last links of the lanes come the first links of the next lanes.
         let (next, of_next) = (first.shifted(down::<1>), each(impulse, down::<1>));
         self.give(last, [&end, &next], [&of_end, &of_next], rows);
     }
 
-    /// Gives impulses of links and of the next ones to the bodies R of a group.
+    /// Applies the impulses of links, and of the links after them, to the bodies R of a group.
     #[inline(always)]
     fn give<const N: usize>(
         &mut self,
@@ -360,7 +366,7 @@ impl ChainSystem {
     ) {
         self.velocities[k] = push(links, given, self.bodies_of(k), rows);
         let [here, next] = links;
-        // No mass: a fixed body, or another chain's.
+        // No mass: an immovable body, or one of another chain.
         let hangs = next.mass[0].simd_gt(f32x8::ZERO);
         let pull = here.pull(1, given[0]) - hangs.select(next.pull(0, given[1]), f32x8::ZERO);
         self.pulls[k] += pull * here.inertia[1] * self.slowing[k];
@@ -370,8 +376,8 @@ impl ChainSystem {
         self.bodies.list().batch(group)
     }
 
-    /// Bytes that a solve reads and writes: rows once written and read twice, what is eliminated, impulses, and bodies R with
-    /// their index.
+    /// Bytes that a solve reads and writes: rows written once and read twice, the eliminated blocks,
+    /// impulses, and bodies R with their indices.
     pub fn traffic(&self) -> [f64; 2] {
         let (row, kept) = (5 * self.size + 4, 2 * self.size * self.size + self.size);
         let half = size_of::<BodyRow>() / 2;
@@ -397,7 +403,7 @@ impl ChainSystem {
     }
 }
 
-/// Links of a group.
+/// The links of a group.
 #[derive(Clone, Copy)]
 struct Link<const N: usize> {
     axis: [[f32x8; 2]; N],
@@ -429,7 +435,7 @@ impl<const N: usize> Link<N> {
         link
     }
 
-    /// Of the lane before, or the one after.
+    /// The links of the lane before, or after.
     #[inline(always)]
     fn shifted(mut self, by: impl Fn(f32x8) -> f32x8) -> Self {
         for r in 0..N {
@@ -463,7 +469,7 @@ impl<const N: usize> Link<N> {
         (k, b)
     }
 
-    /// The arm r = (s_2, −s_1) of a side, in the frame of two rows across each other; 0 without these.
+    /// The arm r = (s_2, −s_1) of a side, in the frame of two perpendicular rows; 0 if there are none.
     #[inline(always)]
     fn arm(&self, side: usize) -> [f32x8; 2] {
         let ([d, e], arms) = ([self.axis[0], self.axis[1]], &self.arms[side]);
@@ -477,7 +483,7 @@ impl<const N: usize> Link<N> {
         dot(self.arm(side), [given[0], given[1]])
     }
 
-    /// C, to the next link.
+    /// C, the block to the next link.
     #[inline(always)]
     fn coupling(&self, next: &Self) -> LaneMatrix<N> {
         let mut block = [[f32x8::ZERO; N]; N];
@@ -498,7 +504,8 @@ fn velocity_of(rows: &[BodyRow], bodies: LaneIndex<[u32; LINK_LANES]>) -> [f32x8
     f32x8::gather_quads::<2, 0>(bytemuck::cast_slice(rows), bodies)
 }
 
-/// Gives impulses to the bodies R of links: of these links, and of the next ones that hang from R. Returns their velocities.
+/// Applies impulses to the bodies R of links: those of these links, and of the next ones, which hang from R.
+/// Returns the velocities of R.
 #[inline(always)]
 fn push<const N: usize>(
     [here, next]: [&Link<N>; 2],
@@ -534,8 +541,8 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Bodies begin at rest; b says how fast rows shall be. The impulses of a row, one by one, change its speed by K_rr |λ_r|:
-        /// what rounding leaves is a share of that.
+        /// Bodies begin at rest; b is the target speed of each row. The impulses of a row, one by one, change
+        /// its speed by K_rr |λ_r|, and the rounding error is a fraction of that.
         #[test]
         fn rows_of_all_chains_hold_afterwards(
             size in 2usize..=3,
@@ -547,7 +554,7 @@ mod tests {
             let mut bodies = vec![links as u32; system.slots()];
             let mut rows = vec![BodyRow { velocity: [0.0; 4], delta: [0.0; 4] }; links + 1];
             let of = |i: usize| &numbers[20 * i..][..20];
-            // A fifth of the chains end at each link; bodies differ in mass, up to a hundredfold.
+            // One link in five begins a new chain. The masses of bodies differ up to a hundredfold.
             let begins = |i: usize| i == 0 || of(i)[0] > 0.6;
             let mass = |i: usize| [of(i)[1].abs() + 0.01, of(i)[2].abs() + 0.01];
             let row = |i: usize, r: usize| {

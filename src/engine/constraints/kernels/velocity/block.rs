@@ -1,22 +1,22 @@
 //! The block sweep: the two normal rows of a contact are solved together.
 //!
-//! Gauss–Seidel on the two points of a manifold needs many sweeps where the points are stiffly
-//! coupled: what one pushes, the other feels. A 2 × 2 problem is solved exactly instead.
+//! Gauss–Seidel on the two points of a manifold needs many sweeps if the points are strongly coupled, since
+//! an impulse at one changes the velocity at the other. Here the 2 × 2 problem is solved exactly.
 //!
 //! # Derivation
 //!
-//! A [rule](crate::engine::constraints::kernels::velocity::rules::NormalRule) gives each row the line λ = max(0, c − s v), v being the
-//! normal velocity that the row sees. With both rows at once, row p sees what the other row's change
-//! does to it, v_p = v_p⁰ + k₁₂ (λ_q − λ_q⁰). So, dividing by s > 0,
+//! A [rule](crate::engine::constraints::kernels::velocity::rules::NormalRule) gives each row the line λ =
+//! max(0, c − s v), where v is the normal velocity of the row. With both rows solved at once, row p also sees
+//! the change of the other row, v_p = v_p⁰ + k₁₂ (λ_q − λ_q⁰). Dividing by s > 0 gives
 //!
 //! ```text
 //! w = A λ − r,   0 ≤ λ ⊥ w ≥ 0,   A = | 1/s₁  k₁₂  |,   r_p = c_p/s_p − v_p⁰ + k₁₂ λ_q⁰
 //!                                     | k₁₂   1/s₂ |
 //! ```
 //!
-//! which for the rigid rule (s = m_eff = 1/k) is K λ + b with the unchanged K of the two rows. Of its four
-//! cases (`catto2006`) exactly one holds if A is positive definite, and the signs of x = A⁻¹ r tell which. With
-//! g_p = s_p k₁₂ and q_p = s_p r_p, so that nothing is divided by an s of zero,
+//! which for the rigid rule (s = m_eff = 1/k) is K λ + b with the K of the two rows. If A is positive
+//! definite, exactly one of its four cases (`catto2006`) holds, and the signs of x = A⁻¹ r tell which. With
+//! g_p = s_p k₁₂ and q_p = s_p r_p, which avoid a division by s = 0,
 //!
 //! ```text
 //! x₁ + g₁ x₂ = q₁,   g₂ x₁ + x₂ = q₂,   g₁ g₂ < 1
@@ -28,20 +28,20 @@
 //! both negative    each that has q_p > 0, which is one at most: q₁ < g₁ q₂ < g₁ g₂ q₁ otherwise
 //! ```
 //!
-//! and in one line each
+//! In one line each:
 //!
 //! ```text
 //! λ₁ = max(0, x₂ < 0 ? q₁ : x₁)      λ₂ = max(0, x₁ < 0 ? q₂ : x₂)
 //! ```
 //!
-//! Where A is close to singular (its determinant below a thousandth of a₁₁ a₂₂) or there is one point only,
+//! If A is close to singular (its determinant below a thousandth of a₁₁ a₂₂), or if there is only one point,
 //! rows are solved one after the other.
 //!
 //! # Order of rows
 //!
-//! Friction rows come first, bounded by the normal impulses so far, so that normal rows have the last word
-//! (`catto2024solver2d`, `solve_pgs_ngs_block`); or they come last, bounded by the new ones, so that the cone
-//! holds and what slides feels the load of now.
+//! There are two variants. Friction rows first, bounded by the previous normal impulses: the normal rows are
+//! then exact at the end of the sweep (`catto2024solver2d`, `solve_pgs_ngs_block`). Or friction rows last,
+//! bounded by the new normal impulses: the cone then holds, and sliding contacts use the current load.
 
 use crate::engine::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_MASS, TURN, arms, separation, spin, to_frame, turn, with_arms,
@@ -56,10 +56,10 @@ use crate::engine::constraints::records::features::{
 };
 use crate::engine::lanes::{BodyRow, Lanes};
 
-/// A matrix with a determinant below this part of a₁₁ a₂₂ is solved row by row (1).
+/// A matrix with a determinant below this fraction of a₁₁ a₂₂ is solved row by row (1).
 const SINGULAR: f32 = 1e-3;
 
-/// A block sweep under a rule; `NORMAL_FIRST`: normal rows come before friction rows.
+/// A block sweep under a rule. `NORMAL_FIRST`: normal rows are solved before friction rows.
 #[derive(Clone, Copy, Debug)]
 pub struct BlockSweep<R, const NORMAL_FIRST: bool>(pub R);
 
@@ -87,7 +87,7 @@ fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule, const NORMAL_FIRST: bool>(
     over_segments!(segment, L, N, R, NORMAL_FIRST; rows, batches, rule);
 }
 
-/// The block sweep as a kernel.
+/// The block sweep as a staged kernel.
 #[derive(Clone, Copy)]
 struct InBlocks<R, const NORMAL_FIRST: bool> {
     rule: R,
@@ -100,7 +100,7 @@ struct BegunBlock<L> {
     constant: [L; 2],
     slope: [L; 2],
     velocity: [L; 2],
-    /// [`unbounded_friction`] of the friction rows that come last.
+    /// [`unbounded_friction`] of the friction rows, if they are solved last.
     friction: [L; 2],
 }
 
@@ -114,8 +114,8 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, const NORMAL
     in_stages::<L, N, O, _, _>(rows, batches, segment, InBlocks::<R, NORMAL_FIRST> { rule });
 }
 
-/// The friction rows of a batch, bounded by the normal impulses in its record; `along_t` is the velocity of b against
-/// a along t, by motion without spin (m/s), so far.
+/// Solves the friction rows of a batch, bounded by the normal impulses in its record. `along_t` is the
+/// current linear velocity of b relative to a along t (m/s).
 #[inline(always)]
 fn friction_rows<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
     record: &mut [L],
@@ -255,7 +255,7 @@ where
 #[inline(always)]
 fn solve_pair<L: Lanes>(points: usize, c: [L; 2], s: [L; 2], v: [L; 2], coupling: L, old: [L; 2]) -> [L; 2] {
     let zero = L::zero();
-    // One after the other: what is left where the pair cannot be solved.
+    // One after the other: the fallback if the pair cannot be solved.
     let first = s[0].neg_mul_add(v[0], c[0]).max(zero);
     if points == 1 {
         return [first, zero];
@@ -270,9 +270,9 @@ fn solve_pair<L: Lanes>(points: usize, c: [L; 2], s: [L; 2], v: [L; 2], coupling
     ];
     // det A/(a₁₁ a₂₂)
     let determinant = g[0].neg_mul_add(g[1], L::splat(1.0));
-    // A point that is not there has s = 0.
+    // A missing point has s = 0.
     let regular = (determinant - L::splat(SINGULAR)).min(s[0]).min(s[1]);
-    // Where it is zero, the result is not used.
+    // If the determinant is zero, the result is not used.
     let inverse = L::splat(1.0) / determinant;
     let both = [g[0].neg_mul_add(q[1], q[0]) * inverse, g[1].neg_mul_add(q[0], q[1]) * inverse];
     std::array::from_fn(|p| {
@@ -286,7 +286,7 @@ fn solve_pair<L: Lanes>(points: usize, c: [L; 2], s: [L; 2], v: [L; 2], coupling
 mod tests {
     use super::*;
 
-    /// Two rows with k₁₁, k₂₂, k₁₂ under the rigid rule without a gap: K λ + v⁰ − K λ⁰ = v.
+    /// Solves two rows with k₁₁, k₂₂, k₁₂ under the rigid rule without a gap: K λ + v⁰ − K λ⁰ = v.
     fn solve(k: [f32; 3], v: [f32; 2], old: [f32; 2]) -> [f32; 2] {
         let s = [1.0 / k[0], 1.0 / k[1]];
         solve_pair::<f32>(2, old, s, v, k[2], old)
@@ -297,14 +297,14 @@ mod tests {
         let k = [2.0, 2.0, 1.0];
         // 2x + y = 3, x + 2y = 3.
         assert_eq!(solve(k, [-3.0, -3.0], [0.0; 2]), [1.0, 1.0]);
-        // The first alone stops itself and lifts the second: 2x = 3, 1.5 − 1 ≥ 0.
+        // The first row alone stops its point and lifts the second: 2x = 3, 1.5 − 1 ≥ 0.
         assert_eq!(solve(k, [-3.0, -1.0], [0.0; 2]), [1.5, 0.0]);
         assert_eq!(solve(k, [-1.0, -3.0], [0.0; 2]), [0.0, 1.5]);
         assert_eq!(solve(k, [1.0, 2.0], [0.0; 2]), [0.0, 0.0]);
     }
 
     proptest::proptest! {
-        /// λ ≥ 0, w = K λ + b ≥ 0 and λ w = 0, each to what rounding does to its terms.
+        /// λ ≥ 0, w = K λ + b ≥ 0 and λ w = 0, each within the rounding error of its terms.
         #[test]
         fn impulses_and_velocities_are_complementary(
             k in [0.5f32..4.0, 0.5..4.0],
@@ -326,7 +326,7 @@ mod tests {
 
     #[test]
     fn accumulated_impulses_are_taken_back() {
-        // With λ⁰ = (1, 1) the velocities are (3, 3) more than without.
+        // With λ⁰ = (1, 1) the velocities are (3, 3) higher than without.
         assert_eq!(solve([2.0, 2.0, 1.0], [0.0, 0.0], [1.0; 2]), [1.0, 1.0]);
         assert_eq!(solve([2.0, 2.0, 1.0], [3.0, 3.0], [1.0; 2]), [0.0, 0.0]);
     }

@@ -1,10 +1,10 @@
-//! The Jacobi sweep: all contacts read the velocities from before the sweep, and what they add
-//! to a body is summed up and applied afterward.
+//! The Jacobi sweep: all contacts read the velocities from before the sweep. The increments of each body are
+//! summed up and applied afterward.
 //!
-//! Within a contact the rows are still solved one after the other (`catto2024solver2d`,
-//! `solve_jacobi`). Sums have an order: color by color, so that they have the same bits at every
-//! width; in exact arithmetic no order matters. The kernel is that of [`crate::engine::constraints::kernels::velocity::sweep`], given a store
-//! of rows that reads from one place and adds up in another.
+//! Within a contact the rows are still solved one after the other (`catto2024solver2d`, `solve_jacobi`). Sums
+//! are taken color by color, so that they have the same bits at every width; in exact arithmetic the order
+//! does not matter. The kernel is that of [`crate::engine::constraints::kernels::velocity::sweep`], with a
+//! row store that reads from one place and accumulates in another.
 
 use crate::engine::constraints::kernels::frame::{INV_MASS, VX, VY, W};
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
@@ -16,7 +16,7 @@ use crate::engine::constraints::records::features::{
 };
 use crate::engine::lanes::{BodyRow, IndexList, LaneIndex, Lanes, RowStore};
 
-/// A Jacobi sweep under the soft rule, which without springs is the rigid one.
+/// A Jacobi sweep under the soft rule, which is the rigid rule if it has no springs.
 #[derive(Debug)]
 pub(crate) struct JacobiSweep<'a> {
     pub rule: Soft,
@@ -27,7 +27,7 @@ pub(crate) struct JacobiSweep<'a> {
 
 impl Pass for JacobiSweep<'_> {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        // Both bodies once for their velocities and once for their sums.
+        // Gathers both bodies once for their velocities and once for their sums.
         let sweep = PerLane::of_sweep(layout, true, opposite);
         PerLane { rows: sweep.rows + sweep.halves, ..sweep }
     }
@@ -52,15 +52,14 @@ impl Pass for JacobiSweep<'_> {
     }
 }
 
-/// Sums start at zero.
+/// Resets the sums to zero, one per row.
 pub(crate) fn begin(rows: &[BodyRow], sums: &mut Vec<BodyRow>) {
     sums.clear();
     sums.resize(rows.len(), BodyRow::default());
 }
 
-/// v ← v + Σ Δv, for every row. Of a body that was split into n copies, each with the n-th part of its
-/// mass, the mean of the copies: v + Σ Δv/n. `masses` are the inverse masses and inertias of the whole
-/// bodies, or empty.
+/// v ← v + Σ Δv, for every row. A body split into n copies, each with 1/n of its mass, gets the mean of the
+/// copies: v + Σ Δv/n. `masses` are the inverse masses and inertias of the whole bodies, or empty.
 pub(crate) fn finish(rows: &mut [BodyRow], sums: &[BodyRow], masses: &[[f32; 2]]) {
     for (i, (row, sum)) in rows.iter_mut().zip(sums).enumerate() {
         let split = row.velocity[INV_MASS];
@@ -74,7 +73,7 @@ pub(crate) fn finish(rows: &mut [BodyRow], sums: &[BodyRow], masses: &[[f32; 2]]
     }
 }
 
-/// Reads velocities from before the sweep; a write adds the difference to the sums.
+/// Reads velocities from before the sweep. A write adds the difference to the sums.
 pub(crate) struct SummedRows<'a> {
     pub(crate) before: &'a [BodyRow],
     pub(crate) sums: &'a mut [BodyRow],

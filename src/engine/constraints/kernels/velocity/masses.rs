@@ -1,9 +1,8 @@
-//! Effective masses for bodies whose masses are scaled for a while.
+//! Effective masses of bodies whose masses are temporarily scaled.
 //!
-//! Mass splitting solves each contact as if it had a part of its bodies' masses to itself; shock
-//! propagation as if what it stands on could not move. Both scale the inverse masses in the rows, and
-//! the effective masses 1/k in the records must follow, k = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (r_a × u)² +
-//! I_b⁻¹ (r_b × u)².
+//! Mass splitting gives each contact a part of its bodies' masses. Shock propagation treats the body below a
+//! contact as immovable. Both scale the inverse masses in the rows, and the effective masses 1/k in the
+//! records must follow, with k = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (r_a × u)² + I_b⁻¹ (r_b × u)².
 
 use crate::engine::constraints::kernels::frame::{BodyPair, INV_INERTIA, INV_MASS, arms};
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
@@ -17,12 +16,12 @@ use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, held};
 /// Inverse masses and inertias of bodies while they are scaled.
 #[derive(Clone, Debug, Default)]
 pub struct ScaledMasses {
-    /// As they are without any factor; empty while they are not scaled. `[bodies]`
+    /// Unscaled values; empty while masses are not scaled. `[bodies]`
     whole: Vec<[f32; 2]>,
 }
 
 impl ScaledMasses {
-    /// Multiplies those of the rows by `factor(body)`, from what they are without any.
+    /// Sets the inverse masses and inertias in the rows to `factor(body)` times their unscaled values.
     pub(crate) fn scale(&mut self, rows: &mut [BodyRow], factor: impl Fn(usize) -> f32) {
         if self.whole.is_empty() {
             self.whole.extend(rows.iter().map(|row| [row.velocity[3], row.delta[3]]));
@@ -34,17 +33,17 @@ impl ScaledMasses {
         }
     }
 
-    /// They are not scaled any more.
+    /// Ends the scaling and discards the unscaled values.
     pub(crate) fn forget(&mut self) {
         self.whole.clear();
     }
 
-    /// Without any factor; empty while they are not scaled. `[bodies]`
+    /// Unscaled values; empty while masses are not scaled. `[bodies]`
     pub(crate) fn whole(&self) -> &[[f32; 2]] {
         &self.whole
     }
 
-    /// Bytes held.
+    /// Allocated bytes.
     pub fn held_bytes(&self) -> usize {
         held(&self.whole)
     }
@@ -52,12 +51,13 @@ impl ScaledMasses {
 
 /// Recomputes effective masses in the records from the rows.
 pub(crate) struct EffectiveMasses<'a> {
-    /// Factors of bodies: records of pairs that have 1 both keep what they have to the bit. Empty: all are recomputed. `[bodies]`
+    /// Factors of bodies. Records of pairs in which both factors are 1 are left unchanged to the bit. If
+    /// empty, all are recomputed. `[bodies]`
     pub factors: &'a [f32],
 }
 
 impl EffectiveMasses<'_> {
-    /// 1 in lanes that are recomputed.
+    /// 1 in lanes to recompute, otherwise 0.
     #[inline(always)]
     fn changed<L: Lanes>(&self, [a, b]: [LaneIndex<L::Index>; 2]) -> L {
         if self.factors.is_empty() {
@@ -118,7 +118,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite>(
                         k = (a[INV_INERTIA] * arm[0]).mul_add(arm[0], k);
                     }
                 }
-                // A point that is not there has no mass, and keeps none.
+                // A missing point has zero mass, and keeps it.
                 let at = layout.at(p, at);
                 let mass = record[at].select_positive(L::splat(1.0) / k, L::zero());
                 record[at] = changed.select_positive(mass, record[at]);

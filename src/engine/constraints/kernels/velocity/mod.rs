@@ -1,4 +1,4 @@
-//! Velocity sweeps: row by row, both points at once, or all contacts at once; and the rules that they solve.
+//! Velocity sweeps (row by row, both points at once, or all contacts at once), and the rules that they solve.
 
 pub mod block;
 pub mod jacobi;

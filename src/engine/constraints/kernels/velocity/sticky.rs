@@ -1,10 +1,11 @@
-//! The sticky sweep: friction holds points at a place, not at a velocity.
+//! The sticky sweep: friction holds points at a position instead of at zero velocity.
 //!
-//! Each point remembers how far it has drifted along the surface since it began to stick, d (m). Its
-//! friction row aims at v_t = −β_t d/h, so that what creeps is brought back; where that takes more than
-//! the cone allows the point slides, and begins to stick again where it is. Normal rows are those
-//! of [`crate::engine::constraints::kernels::velocity::rules::Baumgarte`] without slop. The cone of each point is that of its share of the
-//! manifold's normal impulse, Σ λn/points: a load that shifts from point to point unsticks neither.
+//! Each point stores its drift d along the surface since it began to stick (m). Its friction row aims at v_t
+//! = −β_t d/h, which brings a creeping point back. If this exceeds the cone, the point slides and begins to
+//! stick again at its current position. Normal rows are those of
+//! [`crate::engine::constraints::kernels::velocity::rules::Baumgarte`] without slop. The cone of each point
+//! uses its share of the manifold's normal impulse, Σ λn/points, so a load that shifts from point to point
+//! unsticks neither.
 //!
 //! Within a step a point at R r has drifted by
 //!
@@ -12,19 +13,21 @@
 //! t·(Δx_b − Δx_a) + σ_b (r_b × t) − κ_b (r_b × n) − σ_a (r_a × t) + κ_a (r_a × n)
 //! ```
 //!
-//! with σ = sin Δθ and κ = 1 − cos Δθ, since t·r = r × n. What it drifted before is kept per point.
+//! with σ = sin Δθ and κ = 1 − cos Δθ, since t·r = r × n. The drift from earlier steps is stored per point.
 //!
-//! Drifts follow contacts from step to step in [`Kept`]. Within a step they are in the order of the lanes, as a
-//! [`crate::engine::constraints::records::point_vector::PointVector`] is, whose tangential entries they take: a sweep reads and writes them
+//! Drifts follow contacts from step to step in [`Kept`]. Within a step they are in lane order, in the
+//! tangential entries of a vector laid out as a
+//! [`crate::engine::constraints::records::point_vector::PointVector`], so a sweep reads and writes them
 //! without gathering.
 //!
 //! Source: `catto2024solver2d` (`solve_tgs_sticky`).
 //!
 //! # Patches
 //!
-//! With [`Sticky::patch`] friction is that of PhysX (`nvidia2026physx`): a contact that slides at one of its points
-//! lets go of both, but only for the next step; until then the rows aim at the places of the last. A flag per point says so, which
-//! takes the normal entry of the vector. A gap keeps its rate for the whole step where the step began with one.
+//! With [`Sticky::patch`], friction is that of PhysX (`nvidia2026physx`): a contact that slides at one of its
+//! points releases both, but only for the next step; until then the rows aim at the positions of the last
+//! step. A flag per point marks sliding contacts, in the normal entry of the vector. A point that has a gap
+//! at the start of the step uses the rate 1/h of gaps for the whole step.
 
 use crate::engine::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, spin, to_frame, turn, with_arms,
@@ -40,16 +43,16 @@ use crate::engine::constraints::records::kept::Kept;
 use crate::engine::constraints::records::point_vector::places;
 use crate::engine::lanes::{Block, BodyRow, Lanes, RowStore};
 
-/// Targets of a sweep; see the [module](self). The solver keeps one float per contact point.
+/// Parameters of a sweep; see the [module](self). The solver keeps one float per contact point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sticky {
     /// Substep (s).
     pub h: f32,
-    /// Share of an overlap that is removed per substep (1); 0 leaves positions alone.
+    /// Fraction of an overlap removed per substep (1); 0 leaves positions alone.
     pub fraction: f32,
-    /// Fastest speed at which overlap is pushed apart (m/s).
+    /// Largest push-apart speed of overlap (m/s).
     pub push_speed: f32,
-    /// β_t: share of a drift that is taken back per substep (1).
+    /// β_t: fraction of a drift corrected per substep (1).
     pub stick: f32,
     /// Points farther apart than this (m) do not stick.
     pub reach: f32,
@@ -57,29 +60,29 @@ pub(crate) struct Sticky {
     pub patch: Option<Patch>,
 }
 
-/// What a patch has besides.
+/// Additional parameters of a patch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Patch {
     /// Factor on the increments of friction rows (1).
     pub ease: f32,
-    /// Separations count as this at least (m).
+    /// Lower bound of separations (m).
     pub shallowest: f32,
 }
 
 /// One sweep.
 pub(crate) struct StickySweep<'a> {
     pub sticky: Sticky,
-    /// Of the colored and of the serial batches.
+    /// Drifts of the colored and of the serial batches.
     pub drifts: [&'a mut [Block]; 2],
 }
 
-/// Brings drifts from [`Kept`] into the order of the lanes.
+/// Copies drifts from [`Kept`] into lane order.
 pub(crate) struct LoadDrift<'a> {
     /// As in [`StickySweep`].
     pub drifts: [&'a mut [Block]; 2],
 }
 
-/// Books the drift of the step that ends; see the [module](self).
+/// Stores the drifts at the end of the step in [`Kept`]; see the [module](self).
 pub(crate) struct BookDrift<'a> {
     /// As in [`Sticky`].
     pub reach: f32,
@@ -119,7 +122,7 @@ impl Pass for LoadDrift<'_> {
 
 impl Pass for BookDrift<'_> {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        // Beside the record, the drifts and the index by which they are found.
+        // Reads the record, the drifts and the index by which they are stored.
         let read = 3 + layout.points * (layout.arms() + 2);
         PerLane { halves: 0, ..PerLane::of_bodies(read, layout.points, opposite) }
     }
@@ -145,14 +148,14 @@ fn load<L: Lanes>(batches: &mut Batches, kept: &mut Kept, drifts: &mut [Block], 
     }
 }
 
-/// Where the drifts of point `p` of a batch are.
+/// Index of the drifts of point `p` of a batch.
 #[inline(always)]
 fn drift_at<L: Lanes>(segment: &Segment, batch: usize, p: usize) -> usize {
     let [_, tangential] = places::<L>(segment.first_slot + batch * L::WIDTH, p);
     tangential
 }
 
-/// Where it says of point `p` of a batch that its contact slides.
+/// Index of the sliding flags of point `p` of a batch.
 #[inline(always)]
 fn flag_at<L: Lanes>(segment: &Segment, batch: usize, p: usize) -> usize {
     let [normal, _] = places::<L>(segment.first_slot + batch * L::WIDTH, p);
@@ -233,7 +236,7 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
         }
         if N::FRICTION {
             if patch.is_some() {
-                // Points that bounce have no normal mass meanwhile.
+                // Bouncing points have zero normal mass in this sweep.
                 points = zero;
                 for p in 0..N::POINTS {
                     let mass = record[layout.at(p, layout.tangent_mass)];
@@ -262,7 +265,7 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
                 if patch.is_some() {
                     slides = slides.max(over);
                 } else {
-                    // A point that slides begins to stick again where it is now.
+                    // A sliding point begins to stick again at its current position.
                     drifts[before] = over.select_positive(-drift, drifted - drift);
                 }
                 let delta = new - old;
@@ -307,7 +310,7 @@ fn book<L: Lanes, N: KernelFeatures, O: Opposite>(
             let slides = drifts[flag_at::<L>(segment, batch, p)];
             let drifted = slides.select_positive(L::zero(), drifted);
             let mut near = (L::splat(reach) - separation).select_positive(drifted, L::zero());
-            // Empty lanes name the contact of the first one, and so write what it does.
+            // Empty lanes refer to the contact of the first lane, so they write its value.
             let lanes: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut near));
             let first = lanes[0];
             lanes[filled..].fill(first);

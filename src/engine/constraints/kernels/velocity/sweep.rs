@@ -1,4 +1,5 @@
-//! The contact sweep: one source for every width, every set of features and every solver. Bodies and rows are as in [`crate::engine::constraints::kernels::frame`].
+//! The contact sweep: one source for every width, feature set and solver. Bodies and rows are as in
+//! [`crate::engine::constraints::kernels::frame`].
 //!
 //! # Coupling
 //!
@@ -8,47 +9,48 @@
 //! k_pq = [p and q along the same axis] (m_a⁻¹ + m_b⁻¹) + I_a⁻¹ A_ap A_aq + I_b⁻¹ A_bp A_bq
 //! ```
 //!
-//! with the arms A = r × u. So Gauss–Seidel over the rows needs no body: each row keeps what
-//! its impulse would be, unclamped, at the velocity so far, λ_q = c_q − s_q v_q, and a row
-//! before it takes s_q k_pq δ_p away. From one row to the next it is then one multiply-add,
-//! one clamp and one difference. Against updating `along_n`, `along_t`, ω_a and ω_b after each
-//! row that is 12 % faster, or 6 % with k between points alone. The k are formed in registers.
+//! with the arms A = r × u. So Gauss–Seidel over the rows needs no body. Each row stores its unclamped
+//! impulse at the current velocity, λ_q = c_q − s_q v_q, and each earlier row subtracts s_q k_pq δ_p from it.
+//! One row then depends on the previous one through only one multiply-add, one clamp and one difference. This
+//! is 12 % faster than updating `along_n`, `along_t`, ω_a and ω_b after each row (6 % with k only between
+//! points). The k are formed in registers.
 //!
 //! # Floor, and how far from it
 //!
-//! Two points with friction against a dynamic body, 16 lanes, one Zen 5 core (AVX-512) at up to
-//! 3.8 GHz. A contact is 92 bytes to read and 16 to write; a batch is about 430 instructions
-//! (relaxing; 470 with soft contacts), of which 104 shuffle body rows and 110 to 130 are
-//! arithmetic. Issued at 8 per cycle that is 0.9 to 1.0 ns per contact; 92 bytes are 0.9 ns at the
-//! 100 GB/s of the third-level cache and 2.5 ns at the 37 GB/s of memory. Measured, soft and
-//! relaxing: 2.3 and 2.2 ns with 1 300 contacts, 2.4 and 2.3 with 15 000, 2.9 and 2.7 with
-//! 150 000. So memory is nearly the bound there, and elsewhere the kernel is at 2.4 times its
-//! floor: a batch fills the window of out-of-order execution, so that the chain from a row's
-//! load through four clamps to its store overlaps with little of the next batch. What pays is
-//! a shorter chain and fewer instructions, not fewer bytes.
+//! Case: two points with friction against a dynamic body, 16 lanes, one Zen 5 core (AVX-512) at up to 3.8
+//! GHz. A contact reads 92 bytes and writes 16. A batch is about 430 instructions (relaxing; 470 with soft
+//! contacts), of which 104 shuffle body rows and 110 to 130 are arithmetic. Issued at 8 per cycle, these take
+//! 0.9 to 1.0 ns per contact. 92 bytes take 0.9 ns at the 100 GB/s of the third-level cache and 2.5 ns at the
+//! 37 GB/s of memory. Measured, soft and relaxing: 2.3 and 2.2 ns with 1 300 contacts, 2.4 and 2.3 with
+//! 15 000, 2.9 and 2.7 with 150 000. So with 150 000 contacts memory bandwidth is nearly the bound. With
+//! fewer the kernel takes 2.4 times its lower bound: a batch fills the out-of-order window, so that the chain
+//! from a row's load through four clamps to its store overlaps little with the next batch. A shorter chain
+//! and fewer instructions help; fewer bytes do not.
 //!
-//! With 16 registers (AVX2, `x86-64-v3`), eight lanes, relaxing: a batch is 412 instructions instead of the 349
-//! that it is with 32. Of these 39 store to the stack instead of 8, 28 load from it instead of 3, and 30 have an
-//! operand in it instead of 6; 72 shuffles and some 120 of arithmetic are the same. On the same core that takes 11 %
-//! longer, soft contacts 15 %. Where the stack lay cost more than that (`align_frame`). [`crate::engine::constraints::kernels::stages`] is the answer.
+//! With 16 registers (AVX2, `x86-64-v3`), eight lanes, relaxing: a batch is 412 instructions instead of 349
+//! with 32 registers. Of these, 39 store to the stack instead of 8, 28 load from it instead of 3, and 30 have
+//! an operand in it instead of 6; the 72 shuffles and some 120 arithmetic instructions are the same. On the
+//! same core this takes 11 % longer, soft contacts 15 %. An unlucky placement of the stack cost more than
+//! that (`align_frame`). The remedy is [`crate::engine::constraints::kernels::stages`].
 //!
-//! Tried without gain, without stages: the k of coupling in the record (53 instructions less; −5 and −3 %, preparing +18 %), friction
-//! rows that wait for the spins (41 less; −3 and −2 %), reading records again instead of keeping them on the stack (0 and
-//! −1 %), and a barrier that keeps an inverse mass in one register, not in the two that it is shuffled from (0, −2 %).
+//! Tried without gain, before stages: storing the coupling k in the record (53 instructions fewer; −5 and
+//! −3 %, preparing +18 %); friction rows that wait for the spins (41 fewer; −3 and −2 %); rereading records
+//! instead of keeping them on the stack (0 and −1 %); and a barrier that keeps an inverse mass in one
+//! register instead of the two that it is shuffled from (0, −2 %).
 //!
 //! # Order of rows
 //!
-//! Both normal rows, then both friction rows. Point by point (normal, friction, normal, friction) costs the same
-//! and converges faster: on a pyramid of base 20 by 0.9967 instead of 0.9974 per sweep, and `soft_step` left
-//! 1.4 µm/s instead of 313 on `pyramid:40`. But then the first friction row answers to a spin that the second normal
-//! row would have taken away: boxes wander sideways, one on an incline drifts (A1.stick, A1.slip fail), and a pile
-//! under `pgs` falls (B3.pile). More in `papers/solver2d.md`.
+//! Both normal rows, then both friction rows. Point by point (normal, friction, normal, friction) costs the
+//! same and converges faster: on a pyramid of base 20 by 0.9967 instead of 0.9974 per sweep, and `soft_step`
+//! left 1.4 µm/s instead of 313 on `pyramid:40`. But then the first friction row reacts to a spin that the
+//! second normal row would have removed: boxes wander sideways, a box on an incline drifts (A1.stick, A1.slip
+//! fail), and a pile under `pgs` falls (B3.pile). More in `papers/solver2d.md`.
 //!
-//! Tried without gain: row indices stored as multiples that the addressing mode takes (32
-//! instructions less, relaxing −3 %, soft 0 %; left to itself the compiler then forms addresses
-//! in vectors, +20 %).
-//! Sources: `catto2006` (sequential impulses, accumulated clamping), `catto2024simd`
-//! (gather, solve, scatter by color); the contact frame is this crate's own.
+//! Tried without gain: row indices premultiplied for the addressing mode (32 instructions fewer, relaxing
+//! −3 %, soft 0 %; unless prevented, the compiler then forms addresses in vectors, +20 %).
+//!
+//! Sources: `catto2006` (sequential impulses, accumulated clamping), `catto2024simd` (gather, solve, scatter
+//! by color); the contact frame is this crate's own.
 
 use crate::engine::constraints::kernels::frame::{
     BodyPair, DX, DY, TURN, arms, separation, spin, to_frame, turn, turned, with_arms,
@@ -62,39 +64,39 @@ use crate::engine::constraints::records::features::{
 };
 use crate::engine::lanes::{BodyRow, Lanes, RowStore};
 
-/// The rule that gives the new accumulated impulse of a normal row.
+/// A rule for the new accumulated impulse of a normal row.
 ///
-/// `against_static` tells that body a is static or kinematic.
+/// `against_static` is true if body a is static or kinematic.
 pub trait NormalRule: Copy + Send + Sync + 'static {
-    /// Whether the sweep solves the friction rows as well.
+    /// Whether the sweep also solves the friction rows.
     const FRICTION: bool;
     /// Whether the rule reads the separation.
     const SEPARATION: bool = true;
     /// Whether arms turn with their bodies within the step.
     const TURNED: bool = false;
 
-    /// Whether it has [`Self::line_by_mass`]; block sweeps alone ask for it.
+    /// Whether the rule has its own [`Self::line_by_mass`]. Only block sweeps use it.
     const BY_MASS: bool = false;
 
-    /// Its treatment of position errors of equality rows, such as those of joints.
+    /// The rule for position errors of equality rows, such as those of joints.
     fn of_errors(&self) -> Softness {
         Softness::RIGID
     }
 
-    /// The line `[c, s]` (N·s, kg) of which the new accumulated impulse is max(0, c − s v_n),
-    /// from the separation (m), the effective mass (kg) and the accumulated impulse so far (N·s).
+    /// The line `[c, s]` (N·s, kg) that gives the new accumulated impulse max(0, c − s v_n), from the
+    /// separation (m), the effective mass (kg) and the accumulated impulse so far (N·s).
     ///
-    /// A line, because then all that does not wait for v_n is out of the way when v_n comes.
+    /// With a line, everything that does not depend on v_n is computed before v_n is known.
     fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2];
 
-    /// As [`Self::line`] between two bodies that move, by how unequal their masses are, from 0 to 1; see
-    /// [`Between`](crate::engine::constraints::kernels::velocity::rules::Between).
+    /// As [`Self::line`] between two moving bodies. The weight measures how unequal their masses are, from 0
+    /// to 1; see [`Between`](crate::engine::constraints::kernels::velocity::rules::Between).
     #[inline(always)]
     fn line_by_mass<L: Lanes>(&self, _weight: L, separation: L, mass: L, old: L) -> [L; 2] {
         self.line(false, separation, mass, old)
     }
 
-    /// The same slope (kg) of a friction row, whose new impulse is λ − s v_t within the cone.
+    /// The slope s (kg) of a friction row, whose new impulse is λ − s v_t within the cone.
     #[inline(always)]
     fn tangent_slope<L: Lanes>(&self, mass: L) -> L {
         mass
@@ -109,8 +111,8 @@ pub trait NormalRule: Copy + Send + Sync + 'static {
 
     /// One velocity sweep under this rule over all segments, in order.
     ///
-    /// A method of the rule, so that the compiler puts its instances beside the rule: rules in
-    /// files of their own are compiled side by side, and again only if they change.
+    /// A method of the rule, so that the compiler places its instances next to the rule: rules in separate
+    /// files are compiled in parallel, and recompiled only if they change.
     #[inline(never)]
     fn sweep<L: Lanes, N: KernelFeatures>(self, rows: &mut [BodyRow], batches: &mut Batches) {
         over_segments!(sweep_segment, L, N, Self, [BodyRow]; rows, batches, self);
@@ -136,7 +138,7 @@ impl<R: NormalRule> Pass for Sweep<R> {
     }
 }
 
-/// The law that sweeps under some rule solve. Not the sweep: a law that only names what another pass has solved compiles no kernel.
+/// The contact law of a sweep, without its kernel: naming a law solved by another pass compiles no kernel.
 pub trait ContactLaw {
     /// Whether friction rows are solved.
     fn has_friction(&self) -> bool;
@@ -169,22 +171,22 @@ impl<R: NormalRule> ContactLaw for Sweep<R> {
     }
 }
 
-/// A velocity sweep under some rule: a pass that can say which law it solves.
+/// A velocity sweep whose contact law is known.
 pub trait VelocitySweep: AnyPass + ContactLaw {}
 
 impl<R: NormalRule> VelocitySweep for Sweep<R> {}
 
 /// The rows of a contact along one axis.
 pub(crate) struct Rows<L> {
-    /// Of bodies a and b, per point.
+    /// Arms of bodies a and b, per point.
     arm: [[L; 2]; 2],
-    /// s: what a unit of velocity takes away (kg).
+    /// s: impulse per unit of velocity (kg).
     slope: [L; 2],
-    /// c − s v, unclamped, at the velocity so far (N·s).
+    /// c − s v, unclamped, at the current velocity (N·s).
     impulse: [L; 2],
     /// Accumulated impulse before the sweep (N·s).
     old: [L; 2],
-    /// Impulses that the rows have applied (N·s).
+    /// Sum of the impulses that the rows have applied (N·s).
     pub(crate) sum: L,
 }
 
@@ -194,8 +196,8 @@ impl<L: Lanes> Rows<L> {
         Rows { arm: [pair; 2], slope: pair, impulse: pair, old: pair, sum: L::zero() }
     }
 
-    /// Row `q` after the impulse `delta` at a row with arms `from`; `direct` is the part of k
-    /// that is not by rotation.
+    /// Updates row `q` for the impulse `delta` at a row with arms `from`. `direct` is the part of k that does
+    /// not involve rotation.
     #[inline(always)]
     pub(crate) fn answer<N: KernelFeatures, O: Opposite>(
         &mut self,
@@ -258,7 +260,8 @@ impl<L: Lanes> Rows<L> {
     }
 }
 
-/// c − s v of the friction row of point `p`, which slides at `vt` (m/s): its impulse (N·s) before the cone bounds it.
+/// c − s v of the friction row of point `p` with sliding velocity `vt` (m/s): its impulse (N·s) before
+/// clamping to the cone.
 #[inline(always)]
 pub(crate) fn unbounded_friction<L: Lanes, R: NormalRule>(
     record: &[L],
@@ -271,23 +274,23 @@ pub(crate) fn unbounded_friction<L: Lanes, R: NormalRule>(
     slope.neg_mul_add(vt, record[layout.at(p, layout.tangent_impulse)])
 }
 
-/// The sweep as a kernel: Gauss–Seidel within a contact.
+/// The sweep as a staged kernel: Gauss–Seidel within a contact.
 #[derive(Clone, Copy)]
 struct RowByRow<R>(R);
 
 /// See [`Stages::Begun`].
 #[derive(Clone, Copy)]
 struct BegunPoints<L> {
-    /// sin Δθ, and 1 − cos Δθ, of a and b; only where arms turn.
+    /// sin Δθ and 1 − cos Δθ of a and b; used only if arms turn.
     turn: [[L; 2]; 2],
-    /// Of the normal rows: what a unit of velocity takes away (kg).
+    /// s of the normal rows: impulse per unit of velocity (kg).
     slope: [L; 2],
-    /// Of the rows along n, and along t: c − s v, unclamped (N·s).
+    /// c − s v of the rows along n and along t, unclamped (N·s).
     impulse: [[L; 2]; 2],
 }
 
 impl<L: Lanes> BegunPoints<L> {
-    /// Arms of bodies a and b at point `p` along n, and along t, as the rule has them.
+    /// Arms of bodies a and b at point `p` along n and along t, turned if the rule requires it.
     #[inline(always)]
     fn arms<N: KernelFeatures, O: Opposite, R: NormalRule>(&self, record: &[L], p: usize) -> [[L; 2]; 2] {
         let layout = const { Layout::of::<N, O>() };
@@ -401,7 +404,7 @@ pub fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule>(
     rule.sweep::<L, N>(rows, batches);
 }
 
-/// As [`sweep`], on rows that are kept in another way: to measure what that costs.
+/// As [`sweep`], on another row store: to measure the cost of that store.
 #[inline(never)]
 pub fn sweep_store<L: Lanes, N: KernelFeatures, R: NormalRule, S: RowStore>(
     rows: &mut S,

@@ -1,4 +1,4 @@
-//! The warm start: impulses of the step before, as the first guess of this one.
+//! The warm start: the impulses of the previous step serve as the initial guess of this one.
 
 use crate::engine::constraints::kernels::frame::{
     BodyPair, INV_INERTIA, TURN, W, apply, arms, spin, turn, turned,
@@ -11,16 +11,16 @@ use crate::engine::constraints::records::features::{
 };
 use crate::engine::lanes::{BodyRow, Lanes};
 
-/// The warm start: applies the accumulated impulses, with the arms of the start of the step or with
-/// arms that turn with their bodies.
+/// The warm start: applies the accumulated impulses, with the arms at the start of the step or with arms that
+/// turn with their bodies.
 pub struct WarmStart {
-    /// Arms turn.
+    /// Whether arms turn with their bodies.
     pub turned: bool,
 }
 
 impl Pass for WarmStart {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        // Without friction only the arms along the normal.
+        // Without friction, only the arms along the normal are read.
         let impulses = if layout.has_friction { 2 } else { 1 };
         let arms = if layout.has_friction { layout.arms() } else { layout.arms() / 2 };
         PerLane::of_bodies(2 + layout.points * (impulses + arms), 0, opposite)
@@ -36,7 +36,7 @@ impl Pass for WarmStart {
     }
 }
 
-/// Applies all accumulated impulses, with the arms of the start of the step.
+/// Applies all accumulated impulses, with the arms at the start of the step.
 pub fn warm_start<L: Lanes, N: KernelFeatures>(rows: &mut [BodyRow], batches: &mut Batches) {
     warm_start_with::<L, N, false>(rows, batches);
 }
@@ -49,7 +49,7 @@ fn warm_start_with<L: Lanes, N: KernelFeatures, const TURNED: bool>(
     over_segments!(warm_start_segment, L, N, TURNED; rows, batches);
 }
 
-/// Applies the accumulated impulses of a segment, as the first guess of a step.
+/// Applies the accumulated impulses of a segment.
 #[inline(always)]
 fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite, const TURNED: bool>(
     rows: &mut [BodyRow],

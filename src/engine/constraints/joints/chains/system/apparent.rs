@@ -1,32 +1,38 @@
-//! Apparent masses: what contacts feel of a body that a beam holds.
+//! Apparent masses: the masses that contacts use for the bodies of a beam.
 //!
-//! A push p on bodies of a chain changes their velocities by M⁻¹ p, and the next solve takes back what joints do not allow. A p is left. Contacts
-//! that expect M⁻¹ p find a plank of a stiff beam too light: each sweep stops a small part of a heavy box, the impulse goes on growing
-//! until the box has turned around, and then throws it. So they are solved with masses W⁻¹ in the place of M.
+//! A push p on bodies of a chain changes their velocities by M⁻¹ p. The next solve removes the part that
+//! joints do not allow, and A p remains. Contacts that expect M⁻¹ p treat a plank of a stiff beam as too
+//! light: each sweep stops a small part of a heavy box, the impulse keeps growing until the box has turned
+//! around, and then throws it. So contacts are solved with masses W⁻¹ instead of M.
 //!
 //! # Answers
 //!
-//! A body of inverse mass W (3 × 3) answers pushes by W. Hung by a joint of rows J to what answers by S through its rows J_S, it answers by
+//! A body of inverse mass W (3 × 3) responds to pushes by W. If a joint of rows J attaches it to a body that
+//! responds by S through its rows J_S, it responds by
 //!
 //! ```text
 //! W' = W − W Jᵀ (J W Jᵀ + J_S S J_Sᵀ)⁻¹ J W
 //! ```
 //!
-//! So one pass along a chain and one back give A_ii of all bodies (`featherstone1983`, with inverse inertias).
+//! So one pass along a chain and one back give A_ii of all bodies (`featherstone1983`, with inverse
+//! inertias).
 //!
 //! # Shares
 //!
-//! Contacts take the share W_i = α_i M_i⁻¹. For n bodies of a chain that are loaded, and a push p = a + b on those with α = 1 and with α < 1,
+//! Contacts use the share W_i = α_i M_i⁻¹. For n loaded bodies of a chain, and a push p = a + b on those with
+//! α = 1 (a) and with α < 1 (b),
 //!
 //! ```text
 //! pᵀ A p ≤ 2 aᵀ A a + 2 bᵀ A b,     aᵀ A a ≤ aᵀ M⁻¹ a,     bᵀ A b ≤ n Σ b_iᵀ A_ii b_i,     α_i = min(1, n ‖M_i^½ A_ii M_i^½‖)
 //! ```
 //!
-//! so A ≤ 2 W, which is what sweeps over W need to converge if A follows after each (2 W − A positive definite).
+//! So A ≤ 2 W, which is the condition for the convergence of sweeps with W if A follows after each (2 W − A
+//! positive definite).
 //!
-//! A is that of the start of the step. Beams do not bend; a chain of hinges that is straight then, and stiff, may be slack a substep later, and
-//! what is too heavy by α diverges. So α = 1 where bodies of a chain can move against each other: with two hinges or more, or with three if
-//! it hangs at both ends.
+//! A is that of the start of the step. Beams do not bend. But a chain of hinges that is straight and stiff
+//! then may be slack a substep later, and bodies that α makes too heavy diverge. So α = 1 where bodies of a
+//! chain can move relative to each other: with two hinges or more, or with three or more if it hangs at both
+//! ends.
 
 use super::{ChainSystem, GIVE, up, velocity_of};
 use crate::engine::constraints::records::links::LINK_LANES;
@@ -35,19 +41,19 @@ use glam::{DMat3, DVec3};
 use std::ops::Range;
 use wide::f32x8;
 
-/// Least α. What contacts change in velocities is divided by it, and so are rounding errors.
+/// Smallest α. Velocity changes by contacts are divided by it, and so are their rounding errors.
 const LEAST: f64 = 1.0 / 64.0;
 
-/// The shares of all chains, and room to find them.
+/// The shares of all chains, and the memory to find them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Apparent {
     /// α of bodies R. `[groups]`
     shares: Vec<f32x8>,
-    /// Some is below 1.
+    /// Whether some α is below 1.
     pub(super) lends: bool,
     /// Joints of one chain.
     joints: Vec<LinkJoint>,
-    /// Answers of its bodies R, with all that hangs beyond them.
+    /// Responses of its bodies R, together with everything that hangs beyond them.
     beyond: Vec<DMat3>,
 }
 
@@ -58,7 +64,7 @@ struct LinkJoint {
     rows: [DMat3; 2],
     /// M⁻¹ of L and R.
     masses: [DMat3; 2],
-    /// What is added to J W Jᵀ: γ J M⁻¹ Jᵀ, and 1 where there is no row.
+    /// Added to J W Jᵀ: γ J M⁻¹ Jᵀ, and 1 where there is no row.
     gives: DMat3,
 }
 
@@ -67,7 +73,8 @@ impl LinkJoint {
         self.rows[1].z_axis == DVec3::ZERO
     }
 
-    /// The answer `own` of the body on `side`, hung to what answers by `other`.
+    /// Response of the body on `side`, given its free response `own` and the response `other` of the body
+    /// that it is attached to.
     fn hung(&self, side: usize, own: DMat3, other: DMat3) -> DMat3 {
         let [near, far] = [self.rows[side], self.rows[1 - side]];
         let k = near.transpose() * own * near + far.transpose() * other * far + self.gives;
@@ -89,7 +96,7 @@ impl Apparent {
 }
 
 impl ChainSystem {
-    /// Finds the shares of bodies, given which of them are `loaded`, from the rows as they are. Those of others are 1.
+    /// Finds the shares of the `loaded` bodies from the present rows. The shares of other bodies are 1.
     pub fn find_shares(&mut self, loaded: &[bool], shares: &mut Vec<f32>) {
         self.apparent.begin(self.groups);
         let mut from = 0;
@@ -122,7 +129,7 @@ impl ChainSystem {
         self.apparent.lends = false;
     }
 
-    /// Whether a body has less than all of its inverse mass for contacts.
+    /// Whether some body has less than its whole inverse mass for contacts.
     pub fn lends(&self) -> bool {
         self.apparent.lends
     }
@@ -147,7 +154,7 @@ impl ChainSystem {
                     let root = DMat3::from_diagonal(root);
                     let answer = root * joint.hung(1, beyond, before) * root;
                     let norm = answer.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
-                    // What cannot be told is whole.
+                    // NaN becomes 1.
                     let share = (count * norm).min(1.0);
                     self.set_share(i, share.max(LEAST) as f32);
                 }
@@ -186,7 +193,7 @@ impl ChainSystem {
         LinkJoint { rows, masses, gives: f64::from(GIVE) * k + DMat3::from_diagonal(missing) }
     }
 
-    /// Makes what contacts have changed in velocities M⁻¹ p instead of W p.
+    /// Replaces the velocity changes W p by contacts with M⁻¹ p.
     pub fn push_masses(&self, rows: &mut [BodyRow]) {
         for (k, &share) in self.apparent.shares.iter().enumerate() {
             if !share.simd_lt(f32x8::ONE).any() {
@@ -201,11 +208,11 @@ impl ChainSystem {
         }
     }
 
-    /// Makes inverse masses in the rows those of whole bodies.
+    /// Restores the inverse masses of whole bodies in the rows.
     pub(super) fn take_whole_masses(&mut self) {
         for k in 0..self.groups {
             let right = self.apparent.shares[k];
-            // 1 where no lane is before.
+            // 1 where there is no lane before.
             let of_first = || f32x8::ONE + up::<1>(self.apparent.shares[self.groups - 1] - f32x8::ONE);
             let left = if k == 0 { of_first() } else { self.apparent.shares[k - 1] };
             let masses = &mut self.rows.group_mut(k)[5 * self.size..];
@@ -221,8 +228,8 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// One body of a beam is loaded: its share follows from how pushes in three directions change its velocity once the beam has been
-        /// solved. Beams hang by a weld, or by a hinge.
+        /// One body of a beam is loaded. Its share follows from the velocity changes by pushes in three
+        /// directions, once the beam has been solved. Beams hang by a weld or by a hinge.
         #[test]
         fn a_share_is_what_a_beam_leaves_of_a_push(
             links in 1usize..12,
@@ -280,7 +287,7 @@ mod tests {
                 square += answer.sum::<f32>();
             }
             let share = square.sqrt().clamp(LEAST as f32, 1.0);
-            // What is left of a push in f32 is off by its rounding.
+            // The rest of a push in f32 has the rounding error of the whole push.
             let off = (shares[loaded] - share).abs();
             prop_assert!(off < 1e-3 * share + 3e-4, "{} instead of {share}", shares[loaded]);
         }

@@ -1,21 +1,21 @@
-//! Blocks of a system in lanes: small matrices and vectors, one of each lane.
+//! Blocks of a system in lanes: a small matrix or vector per lane.
 
 use crate::engine::constraints::records::links::LINK_LANES;
 use wide::f32x8;
 
-/// A vector of each lane.
+/// One vector per lane.
 pub(super) type LaneVector<const N: usize> = [f32x8; N];
-/// A matrix of each lane, row by row.
+/// One matrix per lane, row by row.
 pub(super) type LaneMatrix<const N: usize> = [[f32x8; N]; N];
 
-/// Of the lane `D` before, or 0.
+/// Value of the lane `D` before, or 0.
 #[inline(always)]
 pub(super) fn up<const D: usize>(x: f32x8) -> f32x8 {
     let x = x.to_array();
     f32x8::new(std::array::from_fn(|lane| if lane < D { 0.0 } else { x[lane - D] }))
 }
 
-/// Of the lane `D` on, or 0.
+/// Value of the lane `D` after, or 0.
 #[inline(always)]
 pub(super) fn down<const D: usize>(x: f32x8) -> f32x8 {
     let x = x.to_array();
@@ -95,12 +95,13 @@ pub(super) fn reduce<const D: usize, const N: usize>(
     *e = minus([[f32x8::ZERO; N]; N], &to_p, &e_p);
 }
 
-/// L D Lᵀ of a symmetric, positive definite matrix. Unlike with its inverse, rounding errors do not grow with its condition.
+/// L D Lᵀ of a symmetric, positive definite matrix. Unlike with the inverse, rounding errors do not grow with
+/// the condition number.
 #[derive(Clone, Copy)]
 pub(super) struct Factor<const N: usize> {
     /// Below the diagonal.
     lower: LaneMatrix<N>,
-    /// D⁻¹; 0 where rounding has left no pivot.
+    /// D⁻¹; 0 where rounding has left no positive pivot.
     inverse: LaneVector<N>,
 }
 
@@ -144,7 +145,7 @@ impl<const N: usize> Factor<N> {
         transposed(transposed(a).map(|column| self.solve(column)))
     }
 
-    /// Of the lane before, or the one after.
+    /// The factor of the lane before, or after.
     #[inline(always)]
     fn shifted(self, by: impl Fn(f32x8) -> f32x8) -> Self {
         Factor { lower: each_of(self.lower, &by), inverse: each(self.inverse, &by) }

@@ -4,7 +4,7 @@ use super::{Relaxed, Rule, Softness};
 use crate::engine::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
 use crate::engine::lanes::Lanes;
 
-/// λ ← max(0, λ − m_eff (v_n + b)) with the bias velocity of `baumgarte1972`,
+/// λ ← max(0, λ − m_eff (v_n + b)), with the bias velocity of `baumgarte1972`:
 ///
 /// ```text
 /// b = s/h                           s > 0   close the gap, no more
@@ -17,31 +17,31 @@ pub struct Baumgarte {
     pub inv_h: f32,
     /// β/h (1/s)
     pub rate: f32,
-    /// Overlap that is left alone (m).
+    /// Overlap that is not corrected (m).
     pub slop: f32,
     /// v_max (m/s)
     pub push_speed: f32,
 }
 
 impl Baumgarte {
-    /// Removes `fraction` of the overlap beyond `slop` (m) in each substep of `h` (s), at
-    /// `push_speed` (m/s) at most.
+    /// The rule as a value. It removes `fraction` of the overlap beyond `slop` (m) in each substep of `h`
+    /// (s), at no more than `push_speed` (m/s).
     pub fn rule(fraction: f32, slop: f32, push_speed: f32, h: f32) -> Rule {
         Rule::Baumgarte(Sweep(Self::new(fraction, slop, push_speed, h)))
     }
 
-    /// As [`Self::rule`], as it is.
+    /// As [`Self::rule`], but not wrapped in [`Rule`].
     pub fn new(fraction: f32, slop: f32, push_speed: f32, h: f32) -> Self {
         let inv_h = 1.0 / h;
         Baumgarte { inv_h, rate: fraction * inv_h, slop, push_speed }
     }
 
-    /// b (m/s) at a separation (m).
+    /// Bias velocity b (m/s) at a separation (m).
     pub fn bias<L: Lanes>(&self, separation: L) -> L {
         -self.line(false, separation, L::splat(1.0), L::zero())[0]
     }
 
-    /// As [`Self::rule`], with the factor `relaxation` on the increment of each row.
+    /// As [`Self::rule`], with the increment of each row multiplied by `relaxation`.
     pub fn relaxed(fraction: f32, slop: f32, push_speed: f32, h: f32, relaxation: f32) -> Rule {
         let rule = Self::new(fraction, slop, push_speed, h);
         Rule::BaumgarteRelaxed(Sweep(Relaxed { rule, factor: relaxation }))

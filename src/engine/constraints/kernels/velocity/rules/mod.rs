@@ -1,7 +1,7 @@
-//! Rules of normal rows that several solvers use, each with its derivation; [`Rule`] is any of them.
+//! Rules of normal rows shared by several solvers, each with its derivation; [`Rule`] is any of them.
 //!
-//! A rule is the whole difference between many solvers; the [sweep](crate::engine::constraints::kernels::velocity::sweep) around it is shared.
-//! A solver may bring its own: it implements [`NormalRule`].
+//! Many solvers differ only in their rule; the [sweep](crate::engine::constraints::kernels::velocity::sweep)
+//! around it is shared. A solver can define its own rule by implementing [`NormalRule`].
 
 mod baumgarte;
 mod rigid;
@@ -31,7 +31,7 @@ pub enum Rule {
     Touching(Sweep<Touching>),
     /// [`Soft`] without friction rows
     SoftNormal(Sweep<Frictionless<Soft>>),
-    /// [`Soft`] on arms that turn
+    /// [`Soft`] with arms that turn with their bodies
     SoftTurned(Sweep<Turned<Soft>>),
     /// [`Baumgarte`], over- or under-relaxed
     BaumgarteRelaxed(Sweep<Relaxed<Baumgarte>>),

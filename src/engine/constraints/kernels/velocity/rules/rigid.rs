@@ -1,10 +1,10 @@
-//! Rigid contacts: no velocity into the contact, no position feedback.
+//! Rigid contacts: no approach velocity, no position feedback.
 
 use super::Rule;
 use crate::engine::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
 use crate::engine::lanes::Lanes;
 
-/// λ ← max(0, λ − m_eff (v_n + max(s, 0)/h)): gaps may close and no more; no position feedback.
+/// λ ← max(0, λ − m_eff (v_n + max(s, 0)/h)): gaps may just close; overlap is not corrected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rigid {
     /// 1/h (1/s)
@@ -12,12 +12,12 @@ pub struct Rigid {
 }
 
 impl Rigid {
-    /// In substeps of `h` (s).
+    /// The rule in substeps of `h` (s).
     pub fn new(h: f32) -> Self {
         Rigid { inv_h: 1.0 / h }
     }
 
-    /// As [`Self::new`], as a value.
+    /// As [`Self::new`], wrapped in [`Rule`].
     pub fn rule(h: f32) -> Rule {
         Rule::Rigid(Sweep(Self::new(h)))
     }

@@ -1,4 +1,4 @@
-//! Soft contacts: implicit springs.
+//! Soft contacts: implicitly integrated springs.
 
 use super::{Frictionless, Rule, Turned};
 use crate::engine::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
@@ -14,7 +14,7 @@ use std::f32::consts::TAU;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Softness {
-    /// β (1/s): speed of recovery per depth.
+    /// β (1/s): recovery speed per unit of depth.
     pub bias_rate: f32,
     /// γ_m (1)
     pub mass_scale: f32,
@@ -26,13 +26,14 @@ impl Softness {
     /// No position feedback.
     pub const RIGID: Softness = Softness { bias_rate: 0.0, mass_scale: 1.0, impulse_scale: 0.0 };
 
-    /// Critically damped at ω = 2/h, from 1/h: half of an error goes in a substep. One Gauss–Seidel sweep per substep takes
-    /// chains of joints and masses of 1 : 700 along at ω h ≤ 2.2; from 2.4 on they buzz (`papers/joints.md`).
+    /// Critically damped at ω = 2/h, from 1/h: half of an error is removed per substep. One Gauss–Seidel
+    /// sweep per substep is stable for chains of joints and mass ratios of 1 : 700 up to ω h ≤ 2.2; from 2.4
+    /// on they buzz (`papers/joints.md`).
     pub fn stiffest(inv_h: f32) -> Self {
         Softness { bias_rate: 0.5 * inv_h, mass_scale: 8.0 / 9.0, impulse_scale: 1.0 / 9.0 }
     }
 
-    /// A spring of `omega` (rad/s) and `damping_ratio` (1) over `h` (s).
+    /// A spring of `omega` (rad/s) and `damping_ratio` (1) integrated over `h` (s).
     pub fn new(omega: f32, damping_ratio: f32, h: f32) -> Self {
         let denominator = 2.0 * damping_ratio + h * omega;
         let a = h * omega * denominator;
@@ -40,14 +41,15 @@ impl Softness {
     }
 }
 
-/// ω of contacts between dynamic bodies and of those with others (rad/s), where `hertz` (Hz) is set:
-/// at most `fraction` of the rate of substeps of `h` (s), and twice as much with others.
+/// ω of contacts between dynamic bodies, and of contacts with static and kinematic bodies (rad/s), for a
+/// setting of `hertz` (Hz). The first is limited to `fraction` of the substep rate 1/`h` (`h` in s); the
+/// second is twice the first.
 pub fn angular_frequencies(hertz: f32, fraction: f32, h: f32) -> [f32; 2] {
     let omega = TAU * hertz.min(fraction / h);
     [omega, 2.0 * omega]
 }
 
-/// The soft row for overlap; for a gap the rigid row that closes it, no more.
+/// Soft rows for overlap, and rigid rows for gaps, which may just close.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Soft {
     /// 1/h (1/s)
@@ -56,49 +58,49 @@ pub struct Soft {
     pub dynamic: Softness,
     /// Contacts with static and kinematic bodies.
     pub against_static: Softness,
-    /// Fastest speed at which overlap is pushed apart, as γ_m times it (m/s).
+    /// Largest push-apart speed of overlap, including the factor γ_m (m/s).
     pub push_speed: f32,
 }
 
 impl Soft {
-    /// Springs of angular frequencies `omega` (rad/s), between dynamic bodies and with others, in
-    /// substeps of `h` (s).
+    /// Springs of angular frequencies `omega` (rad/s), between dynamic bodies and with static and kinematic
+    /// ones, in substeps of `h` (s).
     pub fn new(omega: [f32; 2], damping_ratio: f32, push_speed: f32, h: f32) -> Self {
         let [dynamic, against_static] = omega.map(|omega| Softness::new(omega, damping_ratio, h));
         Soft { inv_h: 1.0 / h, dynamic, against_static, push_speed }
     }
 
-    /// As [`Self::new`], as a value.
+    /// As [`Self::new`], wrapped in [`Rule`].
     pub fn rule(omega: [f32; 2], damping_ratio: f32, push_speed: f32, h: f32) -> Rule {
         Rule::Soft(Sweep(Self::new(omega, damping_ratio, push_speed, h)))
     }
 
-    /// No springs: a gap may close and no more, overlap is left alone, as under [`super::Rigid`].
+    /// No springs: gaps may just close, and overlap is not corrected, as with [`super::Rigid`].
     pub fn without_springs(h: f32) -> Self {
         Self::baumgarte(0.0, 0.0, h)
     }
 
-    /// Rigid rows that remove `fraction` of an overlap in each substep of `h` (s), at `push_speed` (m/s)
-    /// at most; no slop.
+    /// Rigid rows that remove `fraction` of an overlap in each substep of `h` (s), at no more than
+    /// `push_speed` (m/s). No slop.
     pub fn baumgarte(fraction: f32, push_speed: f32, h: f32) -> Self {
         let stiff = Softness { bias_rate: fraction / h, mass_scale: 1.0, impulse_scale: 0.0 };
         Soft { inv_h: 1.0 / h, dynamic: stiff, against_static: stiff, push_speed }
     }
 
-    /// Without friction rows.
+    /// The rule without friction rows.
     pub fn frictionless(self) -> Rule {
         Rule::SoftNormal(Sweep(Frictionless(self)))
     }
 
-    /// On arms that turn with their bodies within the step.
+    /// The rule with arms that turn with their bodies within the step.
     pub fn turned(self) -> Rule {
         Rule::SoftTurned(Sweep(Turned(self)))
     }
 }
 
 impl NormalRule for Soft {
-    // Friction in the relaxing sweep alone saves a fifth of a step and costs accuracy: a box on
-    // an incline then creeps 10 times as far, and one that slides is 4 % off instead of 0.9 %.
+    // Solving friction only in the relaxing sweep saves a fifth of a step and costs accuracy: a box on an
+    // incline then creeps 10 times as far, and a sliding box is off by 4 % instead of 0.9 %.
     const FRICTION: bool = true;
 
     fn of_errors(&self) -> Softness {
@@ -117,21 +119,22 @@ impl NormalRule for Soft {
     }
 }
 
-/// As [`Soft`], but only the speed of the push is bounded, not the load that a spring carries.
+/// As [`Soft`], but the bound applies only to the push speed, not to the load that a spring carries.
 ///
-/// A row at rest carries the λ that leaks as much as the bias adds, γ_i λ = −m γ_m β s. A bias that is cut off
-/// at the push speed u carries m u/γ_i and no more, however deep s. Let the leak fall with what is cut off:
+/// The impulse λ of a row at rest leaks as much per substep as the bias adds, γ_i λ = −m γ_m β s. If the bias
+/// is capped at the push speed u, the row carries at most m u/γ_i, however large the depth s. So the leak is
+/// reduced by the same factor as the bias:
 ///
 /// ```text
 /// f = min(1, u/(γ_m β |s|))      λ ← max(0, λ − m_eff (γ_m v_n + γ_m β s f) − γ_i f λ)
 /// ```
 ///
-/// Then λ = −m γ_m β s/γ_i at any depth, and what is pushed without a load still moves at u.
+/// Then λ = −m γ_m β s/γ_i at any depth, and unloaded overlap still separates at u.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bearing {
     /// The springs.
     pub springs: Soft,
-    /// Push from which on the leak falls (m/s): u, or infinite for [`Soft`] itself.
+    /// Push speed above which the leak is reduced (m/s): u, or infinite for plain [`Soft`].
     pub from: f32,
 }
 
@@ -168,7 +171,7 @@ mod tests {
         let bearing = Bearing { springs, from: springs.push_speed };
         let mass = 2.0;
         let bears = |depth: f32| mass * 900.0f32.powi(2) * depth / 960.0;
-        // What remains of an impulse at rest, after the soft row and after the one that carries.
+        // Relative change of a resting impulse, under the soft row and under the bearing row.
         let kept = |depth: f32| {
             let after = |rule: [f32; 2]| rule[0] / bears(depth) - 1.0;
             let row = [-depth, mass, bears(depth)];
@@ -184,7 +187,7 @@ mod tests {
             let [soft, bearing] = kept(deep);
             assert!(soft < -1e-3 && bearing.abs() < 1e-5, "{deep}: {soft} {bearing}");
         }
-        // Without a load both push at γ_m u.
+        // Without a load both rules push at γ_m u.
         let unloaded = bearing.line::<f32>(false, -1.0, mass, 0.0);
         assert_eq!(unloaded, springs.line(false, -1.0, mass, 0.0));
     }

@@ -1,18 +1,18 @@
-//! Rigid contacts at points that touch.
+//! Rigid contacts at touching points only.
 
 use super::Rule;
 use crate::engine::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
 use crate::engine::lanes::Lanes;
 
-/// λ ← max(0, λ − m_eff v_n) at points that touch, s < slop; others keep their impulse. No friction.
+/// λ ← max(0, λ − m_eff v_n) at touching points, s < slop; other points keep their impulse. No friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Touching {
-    /// Largest gap of a point that counts as touching (m).
+    /// Largest gap of a touching point (m).
     pub slop: f32,
 }
 
 impl Touching {
-    /// Points within `slop` (m).
+    /// The rule with points within `slop` (m) counted as touching, wrapped in [`Rule`].
     pub fn rule(slop: f32) -> Rule {
         Rule::Touching(Sweep(Touching { slop }))
     }

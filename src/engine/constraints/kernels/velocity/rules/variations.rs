@@ -1,4 +1,4 @@
-//! Rules made of other rules.
+//! Rules built from other rules.
 
 use super::{NormalRule, Softness};
 use crate::engine::lanes::Lanes;
@@ -21,7 +21,7 @@ impl<R: NormalRule> NormalRule for Frictionless<R> {
     }
 }
 
-/// Another rule on arms that turn with their bodies within the step.
+/// Another rule with arms that turn with their bodies within the step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turned<R>(pub R);
 
@@ -40,7 +40,7 @@ impl<R: NormalRule> NormalRule for Turned<R> {
     }
 }
 
-/// Another rule's line c − s v, a part of the way from the old impulse, or beyond: λ + ω (c − s v − λ).
+/// Over- or under-relaxation of another rule's line c − s v: λ + ω (c − s v − λ).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relaxed<R> {
     /// The other rule.
@@ -70,22 +70,23 @@ impl<R: NormalRule> NormalRule for Relaxed<R> {
     }
 }
 
-/// Between two rules, by how unequal the masses of a pair of bodies are.
+/// A blend of two rules, weighted by how unequal the masses of the two bodies are.
 ///
-/// A spring of stiffness k = m ω² and damper c = 2 ζ m ω, with m the mass of the lighter body, damps a body of mass M that rocks on it by
-/// ζ √(m/M) alone, and a sweep takes m/M of that body's speed. With
+/// A spring of stiffness k = m ω² and damper c = 2 ζ m ω, with m the mass of the lighter body, damps a body
+/// of mass M that rocks on it by only ζ √(m/M), and a sweep removes m/M of that body's speed. With
 ///
 /// ```text
 /// w = ((m_a − m_b)/(m_a + m_b))⁴
 /// ```
 ///
-/// the line is (1 − w) times that of `equal` and w times that of `unequal`: bodies of equal masses have the first, to the bit, a body on one of a tenth of
-/// its mass 0.45 of the second. The second damps more, or is [`Relaxed`].
+/// the line is (1 − w) times that of `equal` plus w times that of `unequal`. Bodies of equal masses get the
+/// first, to the bit; a body on one of a tenth of its mass gets 0.45 of the second. The second should damp
+/// more, or be [`Relaxed`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Between<R, S> {
-    /// For bodies of equal masses.
+    /// Rule for bodies of equal masses.
     pub equal: R,
-    /// For a body that is much heavier than the other.
+    /// Rule for a body that is much heavier than the other.
     pub unequal: S,
 }
 
