@@ -8,7 +8,7 @@ use crate::common::settings;
 use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::joints::JointKind;
 use simpulse::engine::solvers::{VARIANTS, Variant};
-use simpulse::lab::scenes::{Geometry, Scene, SceneBody, SceneJoint, load};
+use simpulse::lab::scenes::{Geometry, Scene, SceneBody, load};
 use simpulse::lab::torture::families::FAMILIES;
 use simpulse::lab::torture::family;
 use std::f64::consts::PI;

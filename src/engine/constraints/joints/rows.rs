@@ -37,9 +37,9 @@
 //! S = ω² h makes the deflection under a load exact. The roots of the exact motion are z = e^(−ζωh ± iω_d h),
 //! so A = e^(−2ζωh) makes the decay exact for any ω h. The frequency then has a relative error of ζωh/2.
 //!
-//! For ζ ≥ 1, both roots are real, and A makes the slow one exact, z = e^(−sωh), s = ζ − √(ζ² − 1): A (1 − z
-//! + (ωh)² z) = z (1 − z). Both roots meet at A = (1 + ωh)⁻², D = ωh (2 + ωh), which is used around ζ = 1:
-//! there the decay rate is ln(1 + ωh)/h instead of ω.
+//! For ζ ≥ 1, both roots are real, and A makes the slow one exact, z = e^(−sωh), s = ζ − √(ζ² − 1):
+//! A (1 − z + (ωh)² z) = z (1 − z). Both roots meet at A = (1 + ωh)⁻², D = ωh (2 + ωh), which is used around
+//! ζ = 1: there the decay rate is ln(1 + ωh)/h instead of ω.
 //!
 //! For ω h above 1/2, D grows by (ωh)² − 1/4, which damps the motion that the substep does not resolve. The
 //! result is stable at any ω, like implicit Euler.
