@@ -176,3 +176,10 @@ fn where_pistons_leave_no_room_nothing_is_flung_and_nothing_leaves() {
         assert_eq!(fails, [false; 3], "driven:{number}: {:?}", outcome.faults);
     }
 }
+
+/// A heavy box crushes a light one between it and the floor. Without a bound the light one leaves at 104 m/s.
+#[test]
+fn a_crushed_box_is_not_flung() {
+    let case = family("ratios").unwrap().case(20, 54);
+    assert!(!run_solver(&case, &settings(find("shim").unwrap())).unwrap().has(TortureVerdict::Flung));
+}

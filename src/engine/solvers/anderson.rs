@@ -2,9 +2,10 @@
 //!
 //! **Source.** `walker2011`, section 2; the sweeps are those of [`super::pgs`].
 //!
-//! **Departures.** If a sweep changes impulses by more than twice the change of the previous one, the history is discarded. The
-//! last sweep is not extrapolated, so that impulses end within their bounds. With joints, products of impulses are sums of
-//! energies, Σ x y/m with the effective mass m of each row, since N·s and N·m·s cannot be added.
+//! **Departures.** If the impulses change by more than twice as much in a sweep as in the previous one,
+//! the history is discarded. The last sweep is not extrapolated, so that impulses end within their
+//! bounds. With joints, products of impulses are sums of energies, Σ x y/m with the effective mass m of
+//! each row, since N·s and N·m·s cannot be added.
 //!
 //! **Agreement.** The source at its best: until a residual is reached, depth by problem. Here: 8 iterations,
 //! baumgarte 0.3, depth 3. Apart from the source's method in `f64` over 10 iterations by less than 6e-5:
@@ -14,8 +15,8 @@
 //! **Cost.** That of [`super::pgs`], and after each sweep passes over 2·`depth` + 4 vectors, in lanes. Sweeps
 //! of a step request 3830 B per contact.
 //!
-//! **Fails when** iterations are few, or contacts open and close: the combination is exact for linear sweeps only, and clamping
-//! is not linear.
+//! **Fails when** iterations are few, or contacts open and close: the combination is exact only for
+//! linear sweeps, and clamping is not linear.
 //!
 //! # The method
 //!
@@ -62,7 +63,7 @@ pub static SOLVER: Variant = Variant {
 const DEPTH: usize = 5;
 /// Fraction of the trace that is added to the diagonal of the normal equations (1).
 const RIDGE: f64 = 1e-9;
-/// Growth of |f|² at which the history is discarded (1).
+/// Growth of |f|² above which the history is discarded (1).
 const GROWTH: f64 = 4.0;
 
 fn step(passes: &mut Passes<'_>) {
@@ -77,7 +78,7 @@ fn step(passes: &mut Passes<'_>) {
         let mut images: [_; DEPTH] = [(); DEPTH].map(|_| passes.vector());
         passes.with_system(Phase::Solve, |system| system.lane_impulses(&mut begin));
         let masses = passes.energy_masses(Phase::Solve);
-        // Sweeps seen since the last start, and |f|² of the last one.
+        // Sweeps since the last restart, and |f|² of the previous sweep.
         let (mut seen, mut last) = (0_usize, f64::INFINITY);
         for k in 0..budget.velocity_iterations {
             passes.sweep(Phase::Solve, &rule);
@@ -88,20 +89,20 @@ fn step(passes: &mut Passes<'_>) {
             passes.with_system(Phase::Solve, |system| {
                 system.lane_impulses(&mut swept);
                 let at = seen % depth;
-                // Differences: of f against the last one, which `change` still is, and of g.
+                // Differences of f and g from the previous sweep. `change` still holds the previous f.
                 update(
                     [&mut changes[at], &mut images[at], &mut change, &mut last_swept, &mut begin],
                     [&swept],
                     |[.., last_f, last_g, begin], [g]| {
                         let f = difference(g, begin);
-                        // The next sweep begins here, unless it is extrapolated.
+                        // The next sweep starts from g, unless g is extrapolated.
                         [difference(f, last_f), difference(g, last_g), f, g, g]
                     },
                 );
                 let square = energy(&change, &change, masses.as_ref());
                 let is_first = seen == 0 || square > GROWTH * last;
                 (seen, last) = (if is_first { 1 } else { seen + 1 }, square);
-                // The first sweep has nothing to be a difference of: its place is taken again.
+                // The first sweep after a restart has no predecessor. What it stored is not used.
                 let columns = (seen - 1).min(depth);
                 if is_first {
                     seen = 1;

@@ -1,13 +1,14 @@
-//! Nonsmooth nonlinear conjugate gradients: the change of a sweep serves as the gradient, and the last direction is
-//! followed further, as in the Fletcher–Reeves method.
+//! Nonsmooth nonlinear conjugate gradients: the change of a sweep serves as the gradient, and each sweep
+//! is extrapolated along the previous search direction, as in the Fletcher–Reeves method.
 //!
 //! **Source.** `silcowitz2010`, algorithm 1; the sweeps are those of [`super::pgs`].
 //!
-//! **Departures.** The last iteration does not extrapolate beyond its sweep, so that impulses end within their bounds. With joints,
-//! |r|² is a sum of energies ([`Conjugate`]), since impulses in N·s and N·m·s cannot be added: twenty hanging rods take 101 sweeps to
-//! 10⁻⁴ instead of 167 (`simpulse converge tests/frozen/hanging-chain-20.frozen`).
-//! Symmetric pairs of sweeps, the form of preconditioner that conjugate gradients require, were tried: per sweep they
-//! leave 1.3 to 4.4 times more residual on five of six frozen problems.
+//! **Departures.** The last iteration does not extrapolate beyond its sweep, so that impulses end within
+//! their bounds. With joints, |r|² is a sum of energies ([`Conjugate`]), since impulses in N·s and N·m·s
+//! cannot be added: twenty hanging rods take 101 sweeps to 10⁻⁴ instead of 167
+//! (`simpulse converge tests/frozen/hanging-chain-20.frozen`). Symmetric pairs of sweeps, the form of
+//! preconditioner that conjugate gradients require, were tried. Per sweep, they leave 1.3 to 4.4 times
+//! more residual on five of six frozen problems.
 //!
 //! **Agreement.** The source at its best: until a residual is reached. Here: 8 iterations, baumgarte 0.3. Apart from
 //! the source's method in `f64` over 10 iterations by less than 6e-5: `simpulse agree --solvers nncg`. Departures,
@@ -16,8 +17,8 @@
 //! **Cost.** That of [`super::pgs`]; between iterations impulses are
 //! read, replaced and applied, 3 passes over vectors, in lanes. Sweeps of a step request 4134 B per contact.
 //!
-//! **Fails when** iterations are few or friction keeps switching: a β above 1 restarts, and what is
-//! left is Gauss–Seidel.
+//! **Fails when** iterations are few or friction keeps switching: each β above 1 causes a restart, and
+//! the method degrades to Gauss–Seidel.
 //!
 //! # The method
 //!
@@ -25,7 +26,7 @@
 //! r = sweep(λ) − λ,   β = |r|²/|r_last|² (0 if above 1),   λ ← sweep(λ) + β p,   p ← r + β p
 //! ```
 //!
-//! v follows by M⁻¹Jᵀ β p. The next sweep brings λ back to its bounds.
+//! v changes by M⁻¹Jᵀ β p. The next sweep brings λ back within its bounds.
 
 use super::{Law, Variant};
 use crate::engine::clock::Phase;

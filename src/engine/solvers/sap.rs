@@ -1,15 +1,21 @@
-//! Newton's method on a convex problem in the velocities of bodies, to machine precision: contacts and joints give
-//! way a little, friction is relaxed to a cone, and each step factorizes one sparse matrix, three rows per body.
+//! Newton's method on a convex problem in the velocities of the bodies, to machine precision. Contacts
+//! and joints are slightly soft, friction is relaxed to a cone, and each step factorizes one sparse
+//! matrix with three rows per body.
 //!
-//! **Source.** `castro2022`, sections III to V: unconstrained formulation, analytical inverse dynamics of a contact, exact line search
-//! (Drake's SAP solver). `todorov2014` (MuJoCo) has the same problem with elliptic cones. `anitescu2006` (the relaxation).
+//! **Source.** `castro2022`, sections III to V: unconstrained formulation, analytical inverse dynamics of
+//! a contact, exact line search (Drake's SAP solver). `todorov2014` (MuJoCo) solves the same problem with
+//! elliptic cones. `anitescu2006` (the relaxation).
 //!
-//! **Departures.** A contact gives way by `softness` times its effective inverse mass, along n and t alike; SAP takes 0.025 along n
-//! and 0.001 along t where a contact is to be nearly rigid, MuJoCo's default is about 0.1. Overlap is pushed apart as in [`super::pgs`], but
-//! without a slop, within which soft contacts would sink from step to step. The first velocities are those of the last impulses, not those of the last step, so that momentum is kept before Newton's method has ended. Factors
-//! are within an envelope (`numerics/envelope.rs`), which has no fill ordering of its own. Where one would take more than `factor_work`, steps come from conjugate
-//! gradients with blocks on the diagonal, as MuJoCo's second solver does. Rows of joints give way by 10⁻⁸, those of springs as their law has it; motors and capped
-//! springs have the nearest impulse within their bound, in the norm of what they give way.
+//! **Departures.** The compliance of a contact is `softness` times its effective inverse mass, along n
+//! and t alike. For nearly rigid contacts, SAP uses 0.025 along n and 0.001 along t; MuJoCo's default is
+//! about 0.1. Overlap is pushed apart as in [`super::pgs`], but without a slop, within which soft
+//! contacts would sink from step to step. Newton's method starts from the velocities after warm starting
+//! instead of those of the last step, so that momentum is conserved even if the method ends early.
+//! Factors are within an envelope (`numerics/envelope.rs`), which has no fill ordering of its own. If a
+//! factorization would take more than `factor_work`, conjugate gradients with a block-diagonal
+//! preconditioner find the step, as in MuJoCo's second solver. The relative compliance of rigid joint
+//! rows is 10⁻⁸; that of springs follows from their law. Motors and capped springs have the nearest
+//! impulse within their bound, in the norm of their compliance.
 //!
 //! **Agreement.** The source at its best: until the gradient is small, σ 10⁻³, τ by problem (Drake). Here: 100 iterations,
 //! baumgarte 0.3, softness 0.00001, factor_work 1000. Apart from the solution in `f64` after 2000 iterations by less than 6e-5
@@ -19,8 +25,9 @@
 //! lane: 9 n b² operations for n bodies in a band of b bodies. A step in which nothing changes state takes one or two. Sweeps of a
 //! step request 103653 B per contact.
 //!
-//! **Fails when** anything slides: the relaxation makes the surfaces part at µ times the speed of sliding. When bands are wide. When
-//! iterations end early: impulses are velocities over `softness`, and have nothing to say before velocities do.
+//! **Fails when** bodies slide: the relaxation separates the surfaces at µ times the sliding speed. When
+//! bands are wide. When iterations end early: impulses are velocities divided by `softness`, and mean
+//! nothing until the velocities have converged.
 //!
 //! # The method
 //!

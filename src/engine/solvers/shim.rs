@@ -1,18 +1,18 @@
-//! Soft contacts that do not sag. Each spring is shortened by its deflection under the load that statics assigns to
-//! it, so bodies rest where they were placed.
+//! Soft contacts that do not sag. A statics solve finds the load of each contact, and its spring is shortened
+//! by its deflection under that load. So bodies rest where they were placed.
 //!
 //! **Source.** `papers/shim.md` (*derived*), on the schedule of `catto2024solver2d`.
 //!
-//! **Departures.** Springs have a fixed share of the substep rate as frequency, and carry their load at any depth.
-//! What goes beyond [`super::soft_step`], in `shim/`:
+//! **Departures.** The frequency of springs is a fixed fraction of the substep rate, and springs carry their
+//! load at any depth. Additions to [`super::soft_step`], in `shim/`:
 //!
-//! * `rest/`: loads of statics, found by projected Gauss-Seidel and handed down from body to body, shorten springs;
-//! * `jams.rs`: what is caught in another body or between a piston and a wall begins without impulses, and gets no
-//!   faster than the piston can make it;
-//! * `frames.rs`: what rolls or is carried has the frame of the middle of the step;
-//! * chains of joints that hang from what does not move are solved at once (`constraints/joints/chains`);
+//! * `rest/`: springs are shortened for static loads, found by projected Gauss-Seidel and handed down by body;
+//! * `jams.rs`: bodies caught in another body, or between a piston and a wall, start the step without impulses,
+//!   and their speed is limited to what the piston can give them;
+//! * `frames.rs`: rolling contacts use the frame of the middle of the step;
+//! * chains of joints that hang from a fixed body are solved directly (`constraints/joints/chains`);
 //! * contacts between bodies of unequal masses are damped more and over-relaxed (`rules/variations.rs`, `Between`);
-//! * what comes in bounces or stops before the step, island by island (`constraints/impacts/spread`).
+//! * approaching bodies bounce or stop before the step, island by island (`constraints/impacts/spread`).
 //!
 //! The two normal rows of a contact are solved together, friction rows after them.
 //!
@@ -25,8 +25,9 @@
 //! pass that shortens springs and, if something is fast, 1 that looks for impacts; per substep 2 body passes, 1 elimination
 //! along chains of joints (3 of those that something else acts on), `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. Sweeps of a step request 5736 B per contact.
 //!
-//! **Fails when** an impact takes more visits than its bound (B23.heavy), or a load is removed or moves to another
-//! contact within a step (B23.release, B23.rolling). Some heavy bodies rock on light ones for many seconds.
+//! **Fails when** an impact needs more visits than the limit (B23.heavy), or a load is removed or moves to
+//! another contact within a step (B23.release, B23.rolling). Some heavy bodies rock on light ones for many
+//! seconds.
 
 mod frames;
 mod jams;
@@ -88,16 +89,16 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// Damping ratio of contacts between a body and a much lighter one, over that of others (1).
+/// Factor on the damping ratio of contacts between a body and a much lighter one (1).
 const UNEQUAL_DAMPING: f32 = 7.0;
 
-/// Over-relaxation of their rigid rows (1).
+/// Over-relaxation of the rigid rows of such contacts (1).
 const UNEQUAL_RELAXATION: f32 = 1.4;
 
-/// Place among the parameters.
+/// Index of this parameter.
 const PUSH_SPEED: usize = 2;
 
-/// Places in [`MECHANISMS`].
+/// Indices into [`MECHANISMS`].
 mod part {
     pub const STATICS: usize = 0;
     pub const HAND_DOWN: usize = 1;
@@ -113,7 +114,7 @@ mod part {
     pub const UNEQUAL: usize = 11;
 }
 
-/// What a run can leave out, and what fails then.
+/// Mechanisms that a run can leave out, each with the case that fails without it.
 const MECHANISMS: [Mechanism; 12] = [
     Mechanism {
         name: "statics",
@@ -203,7 +204,7 @@ const MECHANISMS: [Mechanism; 12] = [
     },
 ];
 
-/// What it keeps.
+/// State kept between steps.
 #[derive(Clone, Debug, Default)]
 struct Shim {
     hand_down: HandDown,
@@ -211,20 +212,20 @@ struct Shim {
     chains: Chains,
     /// Whether a dynamic body has a joint; empty without joints. `[bodies]`
     joined: Vec<bool>,
-    /// The same of the last step.
+    /// `joined` of the last step. `[bodies]`
     last_joined: Vec<bool>,
     /// Changes of velocity per substep under the loads of statics. `[rows]`
     fields: Vec<BodyRow>,
-    /// Of the last step (m/s²).
+    /// Gravity of the last step (m/s²).
     gravity: Vec2,
-    /// Number of bodies that have taken a step; they come first.
+    /// Number of bodies that have taken a step. They have the lowest indices.
     stepped: usize,
-    /// Some shape is round.
+    /// Whether a candidate pair has a round shape.
     rolls: bool,
 }
 
-/// Most visits for each of the first points of an island that is hit, so that no step takes four times as long as others. What a step does
-/// besides its substeps takes as long as eight of these.
+/// Visit limit for each of the first points of an island that is hit. With it, no step takes four times as
+/// long as others. The work of a step outside its substeps takes as long as eight substeps.
 fn visits(substeps: u32) -> usize {
     let standard = SOLVER.budget.substeps;
     VISITS * (substeps.min(standard) + 8) as usize / (standard + 8) as usize
@@ -322,7 +323,7 @@ impl Solver for Shim {
 }
 
 impl Shim {
-    /// Finds which dynamic bodies have joints; whether others had in the last step.
+    /// Finds which dynamic bodies have joints. Returns whether this has changed since the last step.
     fn find_joined(&mut self, scene: &CollisionScene<'_>) -> bool {
         if scene.types.is_empty() && self.joined.is_empty() {
             return false;
@@ -336,7 +337,7 @@ impl Shim {
         self.joined != self.last_joined
     }
 
-    /// Contacts found in the first step of one of their bodies bear all of their load at once.
+    /// Lets contacts found in the first step of one of their bodies bear all of their load at once.
     fn place(&self, scene: &mut CollisionScene<'_>) {
         if self.stepped >= scene.bodies.len() {
             return;

@@ -1,12 +1,14 @@
-//! Gauss–Seidel with a coarse problem: what each level of the contact graph carries as a whole is solved exactly before each
-//! sweep, so that a load reaches the ground at once however high the column is.
+//! Gauss–Seidel with a coarse problem: the total load on each level of the contact graph is solved
+//! exactly before each sweep. A load therefore reaches the ground at once, however high the column is.
 //!
-//! **Source.** *derived* for this crate (`constraints/vectors/levels.rs`); the two-level correction of subspaces is that of
-//! `xu1992`, multigrid for bounds in that manner `kornhuber1994`, conjugate gradients around it `silcowitz2010`, sweeps those of [`super::pgs`].
+//! **Source.** *derived* for this crate (`constraints/vectors/levels.rs`). The two-level subspace
+//! correction is that of `xu1992`, its multigrid form for bounds that of `kornhuber1994`. The conjugate
+//! gradients around it are those of `silcowitz2010`, the sweeps those of [`super::pgs`].
 //!
-//! **Departures.** There is one coarse level, of three unknowns a level and island: the resultant force and moment. Its change
-//! is clamped to the cones afterwards instead of within, and is left out where it would not lower the energy. Islands with no
-//! ground under them, contacts within a level and joints are left to the sweeps.
+//! **Departures.** There is one coarse level, with three unknowns per level and island: the resultant
+//! force and moment. Its change is clamped to the cones afterwards instead of being solved within them.
+//! It is skipped if it would not lower the energy. Islands without ground contact, contacts within a
+//! level and joints are left to the sweeps.
 //!
 //! **Agreement.** The source at its best: until a residual is reached. Here: 8 iterations, baumgarte 0.3. Apart
 //! from the solution in `f64` after 2000 iterations by less than 6e-5 (its sweeps and coarse problems end at the
@@ -15,8 +17,8 @@
 //! **Cost.** Per substep 2 body passes and 1 warm start; `velocity_iterations` times 1 sweep, 3 passes over vectors, and 4
 //! passes over points in `f64` and in one lane, in which the coarse matrix is assembled and solved. Sweeps of a step request 8182 B per contact.
 //!
-//! **Fails when** loads spread sideways: what levels carry as a whole says nothing of how wide pyramids share it. What
-//! friction switches is left to the sweeps as well.
+//! **Fails when** loads spread sideways: the total load on a level does not determine how a wide pyramid
+//! shares it. Contacts that switch between sticking and sliding are left to the sweeps as well.
 
 use super::Variant;
 use crate::engine::clock::Phase;
@@ -39,7 +41,7 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// Memory of the method.
+/// State of the method.
 #[derive(Clone, Debug, Default)]
 struct TwoLevel {
     graph: Graph,

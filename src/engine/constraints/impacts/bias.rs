@@ -1,15 +1,16 @@
 //! Restitution as a velocity bias: the rebound speed is the target of the rows.
 //!
-//! A point that comes in at v⁻ < −1 m/s and reaches the surface within the substep shall leave at u = e |v⁻|, so that its
-//! row is
+//! A point that approaches at v⁻ < −1 m/s and reaches the surface within the substep leaves at u = e |v⁻|.
+//! Its row is
 //!
 //! ```text
 //! λ ← max(0, λ − m_eff (v_n − u))
 //! ```
 //!
-//! instead of that of the solver's rule. Few points bounce in a step, so they have a sweep of their own after each
-//! sweep of the solver, which leaves them alone: their effective mass is in the side record meanwhile. Friction rows
-//! stay where they are. Scenes in which nothing bounces have neither the sweep nor the side records.
+//! instead of the row of the solver's rule. Few points bounce in a step, so a separate sweep over them
+//! follows each sweep of the solver. The solver's sweep skips them, because their effective mass is moved to
+//! the side record. Friction rows are unchanged. Scenes without bounces have neither the sweep nor the side
+//! records.
 //!
 //! Source: `catto2007box2d` (`b2ContactSolver`, velocity bias, Box2D 1 to 2.4).
 
@@ -21,24 +22,24 @@ use crate::engine::constraints::records::features::{KernelFeatures, Layout, Oppo
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, Lanes};
 
-/// Side record: per point u (m/s; zero where it does not bounce) and its effective mass (kg).
+/// Side record: per point u (m/s; zero if it does not bounce) and its effective mass (kg).
 pub(super) const fn stride(points: usize) -> usize {
     2 * points
 }
 
-/// Finds what bounces in the coming substep.
+/// Finds the points that bounce in the coming substep.
 pub struct FindBounces {
     /// Substep (s).
     pub h: f32,
-    /// There are no masses to give back.
+    /// Whether this is the first substep: no effective masses have to be restored.
     pub is_first: bool,
-    /// The slowest approach that bounces (m/s).
+    /// Approach speed above which a point bounces (m/s).
     pub slowest: f32,
     /// The fastest rebound (m/s); zero if nothing bounces.
     pub fastest: f32,
 }
 
-/// One sweep over what bounces.
+/// One sweep over the points that bounce.
 pub struct BiasSweep;
 
 impl Pass for FindBounces {

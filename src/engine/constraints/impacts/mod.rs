@@ -2,8 +2,8 @@
 //!
 //! | law | what it does |
 //! |---|---|
-//! | [`ImpactLaw::None`] | nothing bounces, whatever the surfaces say |
-//! | [`ImpactLaw::Bias`] | the speed at which a point is to leave is the target of its row ([`bias`]) |
+//! | [`ImpactLaw::None`] | nothing bounces, whatever the coefficients of restitution |
+//! | [`ImpactLaw::Bias`] | the rebound speed of a point is the target of its row ([`bias`]) |
 //! | [`ImpactLaw::EndPass`] | one pass at the end of the step gives points that speed ([`restitution`]) |
 //! | [`ImpactLaw::Waves`] | bodies bounce before the step, wave by wave (`spread`) |
 //! | [`ImpactLaw::Solver`] | the solver's schedule does it |
@@ -23,7 +23,7 @@ pub(crate) mod touch;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
 pub enum Impacts {
-    /// That of the solver's source.
+    /// The impact law of the solver's source.
     #[default]
     Own,
     /// Waves of impacts before the step.
@@ -69,13 +69,13 @@ pub enum ImpactLaw {
         /// Points that carried an impulse in the previous step bounce only if e ≥ 1.
         only_new: bool,
     },
-    /// Waves before the step, and for what only others push together a pass at its end.
+    /// Waves before the step, and a pass at its end for bodies that others push together.
     Waves,
-    /// The solver's own schedule, with side records of so many lane vectors per contact and per point.
+    /// Part of the solver's own schedule. The fields are the sizes of its side records.
     Solver {
-        /// Of a contact.
+        /// Lane vectors per contact.
         per_contact: usize,
-        /// Of each of its points.
+        /// Lane vectors per contact point.
         per_point: usize,
     },
 }
@@ -98,7 +98,7 @@ impl ImpactLaw {
         }
     }
 
-    /// Lane vectors of a side record of a contact with so many points.
+    /// Lane vectors in the side record of a contact with `points` points.
     pub fn stride(self, points: usize) -> usize {
         match self {
             ImpactLaw::None => 0,
@@ -113,7 +113,7 @@ impl ImpactLaw {
 /// Side records for restitution.
 #[derive(Clone, Debug, Default)]
 pub struct ImpactRecords {
-    /// Of the colored batches, and of the serial ones.
+    /// Side records of the colored batches, then of the serial ones.
     pub bounces: [Bounces; 2],
     /// Impacts before the step.
     pub(crate) spread: spread::Spread,

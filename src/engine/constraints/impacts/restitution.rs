@@ -17,24 +17,24 @@ use crate::engine::constraints::records::features::{KernelFeatures, Layout, Layo
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneIndex, Lanes};
 
-/// Side record: per point the speed of its rebound (m/s; zero where it shall not bounce) and the largest normal impulse so far
-/// (N·s).
+/// Side record: per point the rebound speed (m/s; zero if it does not bounce) and the largest normal impulse
+/// so far (N·s).
 pub(super) const fn stride(points: usize) -> usize {
     2 * points
 }
 
-/// Points that bounce.
+/// Which points bounce.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rebound {
-    /// Approach (m/s) that a point has to exceed.
+    /// Approach speed above which a point bounces (m/s).
     pub threshold: f32,
-    /// Points that bore an impulse in the step before bounce only if e ≥ 1.
+    /// Points that carried an impulse in the previous step bounce only if e ≥ 1.
     pub only_new: bool,
 }
 
-/// Reads the speeds of approach, before anything moves.
+/// Reads the approach speeds before anything moves.
 pub struct ReadApproach {
-    /// Points that bounce.
+    /// Which points bounce.
     pub rebound: Rebound,
     /// Lane vectors of a side record.
     pub stride: usize,
@@ -55,7 +55,7 @@ impl Pass for ReadApproach {
     }
 }
 
-/// Notes the largest impulses, after each substep.
+/// Records the largest impulse of each point after each substep.
 pub struct Track;
 
 impl Pass for Track {
@@ -68,12 +68,12 @@ impl Pass for Track {
     }
 }
 
-/// Bounces, at the end of the step.
+/// Applies the rebounds at the end of the step.
 pub struct Apply;
 
 impl Pass for Apply {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        // Bodies are gathered for each point: to look, and to push.
+        // Bodies are gathered twice per point: to read and to push.
         let read = 3 + layout.points * (layout.arms() + 5);
         let once = PerLane::of_bodies(read, layout.points, opposite);
         let rows = layout.points * (once.rows + once.halves);
@@ -85,10 +85,10 @@ impl Pass for Apply {
     }
 }
 
-// What follows is compiled per width alone: layouts are looked up per segment, and a branch on
-// them per batch is not measurable beside the gathers.
+// The functions below are compiled once per lane width. Layouts are looked up per segment; a branch on
+// them per batch costs nothing measurable next to the gathers.
 
-/// Reads speeds of approach before anything moves. Returns the fastest rebound (m/s).
+/// Reads approach speeds before anything moves. Returns the fastest rebound (m/s).
 pub fn prepare<L: Lanes, N: KernelFeatures>(
     rows: &[BodyRow],
     batches: &mut Batches,
@@ -147,7 +147,7 @@ pub(crate) fn largest<L: Lanes>(value: L) -> f32 {
     floats.iter().fold(0.0, |most, &x| x.max(most))
 }
 
-/// Normal velocity (m/s) and separation (m) of point `p` of a batch, as bodies now are.
+/// Normal velocity (m/s) and separation (m) of point `p` of a batch, at the current positions.
 #[inline(always)]
 pub(crate) fn point<L: Lanes>(
     rows: &[BodyRow],
@@ -176,7 +176,7 @@ pub(crate) fn point<L: Lanes>(
     [with_arms(along_n(0), [a[2], b[2]], 0), with_arms(separation, [versine_a, versine_b], 1)]
 }
 
-/// Notes the largest impulse of each point so far.
+/// Records the largest impulse of each point so far.
 pub fn track<L: Lanes, N: KernelFeatures>(batches: &mut Batches, bounces: &mut Bounces) {
     each_record::<L>(batches, bounces, N::layout, |record, bounce, layout| {
         for p in 0..layout.points {
@@ -201,7 +201,7 @@ fn each_record<L: Lanes>(
     });
 }
 
-/// The bounce itself, contact after contact in sweep order.
+/// Applies the rebounds, contact by contact in sweep order.
 pub fn apply<L: Lanes, N: KernelFeatures>(
     rows: &mut [BodyRow],
     batches: &mut Batches,

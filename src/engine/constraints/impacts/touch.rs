@@ -1,18 +1,21 @@
-//! The moment of an impact of round shapes, and the frame that they have then.
+//! The time of impact of round shapes, and the contact frame at that time.
 //!
-//! Two centers (a corner is one) are d apart at the beginning of a step, and fly with u against each other. Their shapes touch when
+//! Two centers (a corner counts as one) are d apart at the beginning of a step and have the relative velocity
+//! u. Their shapes touch when
 //!
 //! ```text
 //! |d + u t| = R,   t = c/(−b + √(b² − u² c)),   b = d·u < 0,   c = (|d| − R)(|d| + R)
 //! ```
 //!
-//! R being the sum of both radii: t > 0 in the coming step, t < 0 where they were first seen as an overlap. What they do to each
-//! other is along n = (d + u t)/R, and not along d, from which that is up to |u| dt/R away: discs
-//! of half a meter that meet at 10 m/s left in directions that were 7 % off. Arms end at the point where they touch then.
+//! with R the sum of both radii. t > 0 is in the coming step; t < 0 if the contact was first found as an
+//! overlap. The impulse acts along n = (d + u t)/R, not along d. These directions differ by up to |u| dt/R:
+//! without the correction, discs of half a meter that collide at 10 m/s left in directions that were 7 % off.
+//! Arms end at the point of touch.
 //!
-//! An impact is solved at the beginning of the step. Its row replaces the row of the beginning: it has the frame of the
-//! time t and the gap −v_n t, which the bodies close until then. This holds only for impacts that are solved before the
-//! step: in a crowd, where sweeps solve them, the motion of two bodies until they touch is not known.
+//! An impact is solved at the beginning of the step. Its row replaces the row of the beginning: it has the
+//! frame of the time t and the gap −v_n t, which the bodies close until then. This is valid only for impacts
+//! that are solved before the step. In a crowd, where sweeps solve them, the motion of two bodies until they
+//! touch is not known.
 
 use crate::engine::constraints::kernels::frame::turn;
 use crate::engine::constraints::records::features::Layout;
@@ -24,31 +27,31 @@ use glam::Vec2;
 /// A round contact, with the frame of the beginning of the step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Round {
-    /// From the centers of mass to what it is round about (m).
+    /// From the centers of mass to the centers of the round shapes (m).
     centers: [Vec2; 2],
-    /// Between these at the beginning of the step (m).
+    /// From the center on a to the center on b at the beginning of the step (m).
     between: Vec2,
     /// R (m).
     reach: f32,
-    /// From the centers to the point of touch (m).
+    /// Radii: distances from the centers to the point of touch (m).
     radii: [f32; 2],
 }
 
-/// The frame of the moment of touch.
+/// The contact frame at the time of touch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TouchFrame {
-    /// Since the beginning of the step (s).
+    /// Time of touch since the beginning of the step (s).
     pub time: f32,
     /// Unit normal from a to b.
     pub normal: Vec2,
     /// r × n and r × t (m).
     pub arms: [[f32; 2]; 2],
-    /// Of the row from which v_n gets to the touch, were bodies where they are at the beginning of the step (m).
+    /// Separation in the row (m): the gap that v_n closes by the time of touch, from the start of the step.
     pub separation: f32,
 }
 
 impl Round {
-    /// The round shapes of a contact, if there are any. `is_held`: a is, and the point lies on b's surface.
+    /// The round shapes of a contact, if it has any. `is_held`: a is held, and the point lies on b's surface.
     pub fn of(contact: &Contact, is_held: bool) -> Option<Self> {
         let (radii, reach) = (contact.radii, contact.radii[0] + contact.radii[1]);
         if reach == 0.0 || reach == f32::INFINITY {
@@ -63,7 +66,8 @@ impl Round {
         Some(Round { centers, between, reach, radii })
     }
 
-    /// The frame in which bodies touch that fly on as they do, if they do so between the times `from` and `to` (s).
+    /// The frame in which the bodies touch at their current velocities, if between the times `from` and `to`
+    /// (s).
     pub fn frame(&self, [a, b]: [&BodyRow; 2], [from, to]: [f32; 2]) -> Option<TouchFrame> {
         let spins = [a.velocity[2], b.velocity[2]];
         let moved = |k: usize| {
@@ -82,7 +86,8 @@ impl Round {
         }
         let touching = d + time * u;
         let normal = touching / touching.length();
-        // Along tangents, as u has it: both arms end at one point then, and angular momentum stays.
+        // Centers move along tangents, as in u. So both arms end at one point, and angular momentum is
+        // conserved.
         let center =
             |k: usize| self.centers[k] + (time * spins[k] + [a, b][k].delta[2]) * self.centers[k].perp();
         let anchors = [center(0) + self.radii[0] * normal, center(1) - self.radii[1] * normal];
@@ -103,7 +108,7 @@ fn straight(row: &BodyRow) -> Vec2 {
 }
 
 impl TouchFrame {
-    /// Takes the place of the frame in the record of its lane, by `put(vector, value)`.
+    /// Replaces the frame in the record of its lane, by `put(vector, value)`.
     pub fn write_record(&self, layout: &Layout, rows: [&BodyRow; 2], mut put: impl FnMut(usize, f32)) {
         let [k_nn, k_tt, _] = couplings(rows, self.arms);
         put(0, self.normal.x);

@@ -1,4 +1,4 @@
-//! Rows of joints one by one, for methods that build a system of all rows of a scene.
+//! Rows of individual joints, for methods that assemble a system of all rows of a scene.
 
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::pass::PassMode;
@@ -6,12 +6,12 @@ use crate::engine::constraints::kernels::types::Placed;
 use crate::engine::constraints::records::rows::{ROWS, RowBlock, RowLaw};
 use crate::engine::constraints::vectors::system::System;
 
-/// The blocks of all joints, in the order of their types.
+/// The blocks of all joints, ordered by type.
 #[derive(Clone, Debug, Default)]
 pub struct JointBlocks {
-    /// All of them, with the impulses of the records.
+    /// All blocks, with the impulses of the records.
     pub blocks: Vec<RowBlock>,
-    /// Type of each joint, its number in it, and where its blocks begin. `[joints]`
+    /// Type of each joint, its index within the type, and its first block. `[joints]`
     joints: Vec<[usize; 3]>,
 }
 
@@ -30,7 +30,7 @@ impl System<'_> {
         all
     }
 
-    /// The impulses of the blocks become those of the joints; velocities stay as they are.
+    /// Sets the impulses of the joints to those of the blocks. Velocities do not change.
     pub fn set_joint_impulses(&mut self, from: &JointBlocks) {
         let ends = from.joints.iter().skip(1).map(|joint| joint[2]).chain([from.blocks.len()]);
         let placed = Placed { rows: self.rows, poses: self.others.poses };
@@ -42,13 +42,13 @@ impl System<'_> {
 }
 
 impl RowBlock {
-    /// Row `r` on body a or b: `[d, d, s]` with the sign of its side.
+    /// Row `r` of J on body a (`side` 0) or b: `[d, d, s]`, with the sign of the side.
     pub fn on(&self, side: usize, r: usize) -> [f64; 3] {
         let (sign, j) = (if side == 0 { -1.0 } else { 1.0 }, &self.jacobians[r]);
         [j.axis[0], j.axis[1], j.arms[side]].map(|x| sign * f64::from(x))
     }
 
-    /// b of J v + b + R λ = 0, see `constraints/joints/rows.rs`: `rate` is β of rigid rows (1/s).
+    /// b of J v + b + R λ = 0, see `constraints/joints/rows.rs`. `rate` is β of rigid rows (1/s).
     pub fn bias(&self, rate: f32, h: f32) -> [f32; ROWS] {
         self.errors.map(|error| match self.law {
             RowLaw::Rigid => rate * error,
@@ -58,7 +58,7 @@ impl RowBlock {
         })
     }
 
-    /// R = `softness` K (1).
+    /// Factor of K in R = `softness` K (1).
     pub fn softness(&self) -> f32 {
         match self.law {
             RowLaw::Spring { damping, .. } => 1.0 / damping.max(1e-9),
@@ -66,7 +66,7 @@ impl RowBlock {
         }
     }
 
-    /// Greatest norm of its impulses, where there is one.
+    /// Limit on the norm of its impulses, if any.
     pub fn cap(&self) -> Option<f32> {
         match self.law {
             RowLaw::Motor { cap, .. } => Some(cap),

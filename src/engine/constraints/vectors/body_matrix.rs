@@ -1,14 +1,15 @@
-//! The matrix of a penalty on all rows, in the space of the bodies, factorized once and used many times.
+//! The matrix of a penalty on all rows, in the space of the bodies: factorized once, used many times.
 //!
-//! With a diagonal C and R of springs, (J M⁻¹ Jᵀ + R + C⁻¹) λ = r has as many unknowns as there are rows of contacts and
-//! joints. The same λ comes from the velocities that it gives the bodies, δ = M⁻¹ Jᵀ λ:
+//! For a diagonal C and R of springs, (J M⁻¹ Jᵀ + R + C⁻¹) λ = r has one unknown per row of contacts and
+//! joints. The same λ follows from the velocity change of the bodies, δ = M⁻¹ Jᵀ λ:
 //!
 //! ```text
 //! (M + Jᵀ S J) δ = Jᵀ S r,   λ = S (r − J δ),   S = (C⁻¹ + R)⁻¹
 //! ```
 //!
-//! Three unknowns a body, coupled where bodies touch or are joined, however many points they touch at. It is factorized as
-//! 1 + M^(−1/2) Jᵀ S J M^(−1/2): symmetric, no pivot below one, whatever the masses, and bodies that do not move drop out.
+//! This has three unknowns per body. Bodies that touch or are joined are coupled, no matter at how many
+//! points they touch. The matrix is factorized as 1 + M^(−1/2) Jᵀ S J M^(−1/2). This form is symmetric,
+//! has no pivot below one whatever the masses, and drops bodies that do not move.
 
 use crate::engine::constraints::numerics::envelope::Envelope;
 use crate::engine::constraints::records::rows::{ROWS, RowBlock};
@@ -16,11 +17,11 @@ use crate::engine::constraints::vectors::blocks::JointBlocks;
 use crate::engine::constraints::vectors::system::{Pair, System};
 use crate::engine::lanes::BodyRow;
 
-/// The matrix and its factor; keeps its memory.
+/// The matrix and its factor. Keeps its memory between steps.
 #[derive(Clone, Debug, Default)]
 pub struct BodyMatrix {
     envelope: Envelope,
-    /// Pairs of bodies that couple, both ways round and sorted, and where those of each body begin.
+    /// Pairs of coupled bodies, in both orders and sorted; and where the pairs of each body begin.
     pairs: Vec<[u32; 2]>,
     begins: Vec<usize>,
     /// M^(−1/2) of each body (kg^(−1/2), kg^(−1/2), kg^(−1/2) m⁻¹).
@@ -33,7 +34,7 @@ pub struct BodyMatrix {
 type Scaled = [[f64; 3]; 2];
 
 impl BodyMatrix {
-    /// Orders the bodies of a step. Returns how many numbers a factor has.
+    /// Orders the bodies of a step. Returns the number of entries of the factor below its diagonal.
     pub fn begin(&mut self, system: &mut System<'_>, joints: &JointBlocks) -> usize {
         self.roots.clear();
         self.roots.extend(system.rows().iter().map(|row| {
@@ -67,8 +68,9 @@ impl BodyMatrix {
         self.envelope.entries()
     }
 
-    /// The factor for C = `compliance` D, with D the inverse of the diagonal of J M⁻¹ Jᵀ + R. The two rows of a contact point
-    /// share the entry of its normal row; without friction the tangential one is left out. False if it is no number.
+    /// Computes the factor for C = `compliance` D, where D is the inverse of the diagonal of
+    /// J M⁻¹ Jᵀ + R. Both rows of a contact point use the entry of its normal row. Tangential rows
+    /// without friction are left out. Returns `false` if a pivot is below 0.5 or not finite.
     pub fn factorize(&mut self, system: &System<'_>, joints: &JointBlocks, compliance: f64) -> bool {
         self.envelope.clear();
         let unit = std::array::from_fn(|r| std::array::from_fn(|c| f64::from(u8::from(r == c))));
@@ -90,8 +92,8 @@ impl BodyMatrix {
         self.envelope.factorize(0.5)
     }
 
-    /// δ from M δ of [`Self::factorize`]'s system: x holds what the impulses S r make of the velocities, M⁻¹ Jᵀ S r (m/s and
-    /// rad/s), and then δ.
+    /// Solves the system of [`Self::factorize`] for δ. On entry, x is the velocity change M⁻¹ Jᵀ S r due
+    /// to the impulses S r (m/s and rad/s); on return, it is δ.
     pub fn solve(&mut self, x: &mut [[f64; 3]]) {
         self.unknowns.clear();
         for (x, root) in x.iter().zip(&self.roots) {
@@ -103,7 +105,7 @@ impl BodyMatrix {
         }
     }
 
-    /// Rows of a joint: with C⁻¹ + R = L Lᵀ they are those of L⁻¹ J.
+    /// Adds the rows of a joint: with C⁻¹ + R = L Lᵀ, these are the rows of L⁻¹ J.
     fn add_joint(&mut self, block: &RowBlock, compliance: f64) {
         let (n, softness) = (block.size, f64::from(block.softness()));
         let mut rows = [[[0.0; 3]; 2]; ROWS];
@@ -112,7 +114,7 @@ impl BodyMatrix {
             rows[r] = self.scaled(block.bodies, |side| block.on(side, r));
             let mut k = block.response[r].map(f64::from);
             if k[r] <= 0.0 {
-                // What nothing can move.
+                // No body can move along this row.
                 k = [0.0; ROWS];
                 k[r] = 1.0;
                 rows[r] = [[0.0; 3]; 2];
@@ -134,7 +136,7 @@ impl BodyMatrix {
         }
     }
 
-    /// J M^(−1/2) of a row, `on(side)` being J; zero on what is no body.
+    /// J M^(−1/2) of a row, where `on(side)` is J. Zero for an index that is not a body.
     fn scaled(&self, bodies: [u32; 2], on: impl Fn(usize) -> [f64; 3]) -> Scaled {
         [0, 1].map(|side| {
             let root = self.roots.get(bodies[side] as usize).copied().unwrap_or_default();

@@ -1,9 +1,9 @@
-//! Nonlinear conjugate gradients around any iteration on impulses. The change of the impulses in one iteration serves as the
-//! gradient.
+//! Nonlinear conjugate gradients around any iteration on impulses. The change of the impulses in one
+//! iteration serves as the gradient.
 //!
-//! Source: `silcowitz2010`, algorithm 1: r = λ⁺ − λ, β = |r|²/|r⁻|² with a restart where it is above one, p = β p + r, and
-//! the next iteration starts from λ⁺ + β p. In scenes with joints, |r|² = Σ r²/m with the effective mass m of each row: their rows
-//! are in N·s and N·m·s, whose squares cannot be added.
+//! Source: `silcowitz2010`, algorithm 1: r = λ⁺ − λ, β = |r|²/|r⁻|² with a restart if it is above one,
+//! p = β p + r, and the next iteration starts from λ⁺ + β p. In scenes with joints, |r|² = Σ r²/m with the
+//! effective mass m of each row: joint rows are in N·s and N·m·s, whose squares cannot be added.
 
 use crate::engine::constraints::records::point_vector::{
     PointVector, difference, energy, scaled, sum, update,
@@ -21,7 +21,7 @@ pub struct Conjugate {
 }
 
 impl Conjugate {
-    /// From vectors of zeros, and the masses of [`energy`].
+    /// Takes vectors of zeros, and the masses for [`energy`].
     pub fn new([last, swept, direction]: [PointVector; 3], masses: Option<PointVector>) -> Self {
         Conjugate { last, swept, direction, masses, previous: f64::INFINITY }
     }
@@ -49,7 +49,7 @@ impl Conjugate {
         std::mem::swap(last, swept);
     }
 
-    /// The vectors and the masses, for the workspace.
+    /// The vectors and the masses, to return to the workspace.
     pub fn vectors(self) -> ([PointVector; 3], Option<PointVector>) {
         ([self.last, self.swept, self.direction], self.masses)
     }

@@ -1,30 +1,32 @@
-//! A coarse contact problem: what each level of the contact graph carries, solved exactly.
+//! A coarse contact problem: the total load on each level of the contact graph, solved exactly.
 //!
 //! # Derivation
 //!
-//! A sweep hands a load on by one contact, so that a column of n bodies takes some n² of them. But what all bodies above a
-//! level weigh is one force and one moment, which that level's contacts share. So let the bodies of an island above level l move as one, with
-//! the velocity field of a rigid motion U_m: along x, along y, or turning. Impulses that resist it are
+//! A sweep passes a load on by one contact, so a column of n bodies takes about n² sweeps. But the weight
+//! of all bodies above a level is one force and one moment, which the contacts of that level share. So
+//! let the bodies of an island above level l move as one, with the velocity field of a rigid motion U_m:
+//! along x, along y, or turning. The impulses that resist it are
 //!
 //! ```text
 //! δλ = Σ_m α_lm p_lm,   p_lm = J U_m   in the rows of level l that are at work,   0 elsewhere
 //! ```
 //!
-//! Rows at work are normal ones that push or are approached, and tangential ones inside their cone. The best α of all levels at once
-//! takes the energy ½ δλᵀ K δλ + δλᵀ u to its least (Galerkin):
+//! Rows at work are normal rows with an impulse or an approaching velocity, and tangential rows inside
+//! their cone. The best α of all levels together minimizes the energy ½ δλᵀ K δλ + δλᵀ u (Galerkin):
 //!
 //! ```text
 //! (Pᵀ K P) α = −Pᵀ u,   K = J M⁻¹ Jᵀ
 //! ```
 //!
-//! Impulses of level l act on bodies of levels l and l − 1, so the matrix is block tridiagonal, three rows a level, and its factor takes
-//! time linear in the levels. In a column it is the whole problem. The change is clamped to the cones, and left out where it
-//! would not lower the energy.
+//! Impulses of level l act on bodies of levels l and l − 1, so the matrix is block tridiagonal with three
+//! rows per level. Factorizing it takes time linear in the number of levels. In a column, it is the whole
+//! problem. The change is clamped to the cones, and skipped if it would not lower the energy.
 //!
 //! # Places
 //!
-//! Where contacts are to each other follows from their arms, r = (r × n) t − (r × t) n, from body to body: places are those within
-//! an island, whose bodies touch each other. The ground is not part of islands.
+//! Relative positions of contacts follow from their arms, r = (r × n) t − (r × t) n, from body to body.
+//! Places are positions within an island, whose bodies touch each other. The ground is not part of any
+//! island.
 
 use crate::engine::constraints::numerics::envelope::Envelope;
 use crate::engine::constraints::records::graph::{Graph, UNSUPPORTED};
@@ -33,29 +35,29 @@ use crate::engine::lanes::held;
 
 /// Rigid motions in the plane.
 const MODES: usize = 3;
-/// Relative shift of the diagonal: motions that no contact of a level resists are left alone.
+/// Relative shift of the diagonal: motions that no contact of a level resists are not corrected.
 const SHIFT: f64 = 1e-9;
-/// What of its cone a tangential impulse may take before it counts as sliding (1).
+/// Fraction of its bound at which a tangential impulse counts as sliding (1).
 const STICKS: f32 = 1.0 - 1e-6;
 
-/// The coarse problem of a step; keeps its memory.
+/// The coarse problem of a step. Keeps its memory between steps.
 #[derive(Clone, Debug, Default)]
 pub struct Levels {
     points: Vec<LevelPoint>,
-    /// The first point of each contact in the list above, or of any other.
+    /// Rows of all points, and the index of the first one of each contact.
     rows: Vec<PointRows>,
     first: Vec<usize>,
-    /// Level below each body, counted through all islands, and its place in its island (m).
+    /// Level below each body, numbered across all islands, and position of each body in its island (m).
     own: Vec<usize>,
     places: Vec<[f64; 2]>,
     queue: Vec<u32>,
-    /// Where the levels of each island begin.
+    /// First level of each island, then the number of levels.
     begins: Vec<usize>,
     inverse: Vec<[f64; 3]>,
     envelope: Envelope,
-    /// Of the levels.
+    /// Right-hand side of the levels, then α.
     right: Vec<f64>,
-    /// What modes of the level below a body, and of that above, push it by.
+    /// Jᵀ p on each body, for the modes of the level below it and of the level above it.
     pushes: Vec<[[[f64; 3]; MODES]; 2]>,
     moved: Vec<[f64; 3]>,
     impulses: Vec<Pair>,
@@ -68,19 +70,19 @@ pub struct Levels {
 #[derive(Clone, Copy, Debug)]
 struct LevelPoint {
     rows: PointRows,
-    /// Its level, counted through all islands.
+    /// Its level, numbered across all islands.
     level: usize,
-    /// Which of its bodies is above.
+    /// Side of the upper body.
     above: usize,
     /// p of its two rows.
     weights: [[f64; MODES]; 2],
 }
 
-/// A body in no island.
+/// A body in no island, or a contact without points.
 const NONE: usize = usize::MAX;
 
 impl Levels {
-    /// Finds the levels of a step. `bias` is that of a separation (m to m/s).
+    /// Finds the levels of a step. `bias` maps a separation (m) to a bias velocity (m/s).
     pub fn begin(&mut self, system: &mut System<'_>, graph: &Graph, bias: impl Fn(f32) -> f32) {
         self.inverse.clear();
         self.inverse
@@ -100,12 +102,12 @@ impl Levels {
         self.delta.resize(system.len(), [0.0; 2]);
     }
 
-    /// Whether no contact is between two levels.
+    /// Whether no contact connects two levels.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
 
-    /// Islands, places, and where the levels of each island begin.
+    /// Finds islands, places, and the first level of each island.
     fn find_islands(&mut self, graph: &Graph) {
         let levels = graph.levels();
         let stands = |body: u32| levels.get(body as usize).is_some_and(|&l| l != 0 && l != UNSUPPORTED);
@@ -146,11 +148,11 @@ impl Levels {
         }
     }
 
-    /// Points between two levels, and their rows of P.
+    /// Finds the points between two levels, and their rows of P.
     fn find_points(&mut self, graph: &Graph) {
         let level_of = |body: u32| graph.levels().get(body as usize).map_or(0, |&level| level);
         let count = *self.begins.last().unwrap_or(&0);
-        // Mean place and squared extent of the points of each level.
+        // Sum of the places of the points of each level, and their number.
         let mut sums = std::mem::take(&mut self.moved);
         sums.clear();
         sums.resize(count, [0.0; 3]);
@@ -182,7 +184,7 @@ impl Levels {
         self.moved = sums;
     }
 
-    /// One correction of all levels; impulses and velocities follow.
+    /// Corrects all levels once, and updates impulses and velocities.
     pub fn correct(&mut self, system: &mut System<'_>) {
         system.impulses(&mut self.impulses);
         system.relative_velocities(&mut self.velocities);
@@ -233,7 +235,7 @@ impl Levels {
         [normal > 0.0 || un < 0.0, tangent.abs() < STICKS * self.surfaces[at][1] * normal]
     }
 
-    /// α into `right`. False if there is none.
+    /// Solves for α, into `right`. Returns `false` if the matrix is not positive definite.
     fn assemble(&mut self) -> bool {
         let count = *self.begins.last().unwrap_or(&0);
         self.right.clear();
@@ -248,7 +250,7 @@ impl Levels {
                 let right = &mut self.right[MODES * point.level..][..MODES];
                 right.iter_mut().zip(weights).for_each(|(to, weight)| *to -= weight * u);
                 for side in 0..2 {
-                    // A body above is pushed by the level below it.
+                    // The upper body is pushed by the level below it, the lower one by the level above it.
                     let from = usize::from(side != point.above);
                     let j = point.rows.on(side, axis);
                     if let Some(pushes) = self.pushes.get_mut(point.rows.bodies[side] as usize) {
@@ -261,7 +263,7 @@ impl Levels {
         }
         let begins = &self.begins;
         self.envelope.begin::<MODES, _>(count, |level| {
-            // The levels of an island are a chain.
+            // The levels of an island form a chain.
             let after = begins.partition_point(|&begin| begin <= level);
             let (first, end) = (begins[after - 1], begins[after]);
             level.saturating_sub(1).max(first)..(level + 2).min(end)

@@ -1,7 +1,7 @@
-//! Passes between the records of contacts and [`PointVector`]s: impulses in and out, J v, and M⁻¹ Jᵀ.
+//! Passes between contact records and [`PointVector`]s: impulses in and out, J v, and M⁻¹ Jᵀ.
 //!
-//! A pass is compiled per width alone: which quantities a record has is asked per batch, as what it
-//! waits for is memory. Contacts are pushed color by color, in the order of a warm start.
+//! A pass is compiled once per width. Which quantities a record has is checked at run time, per batch,
+//! since passes are memory-bound. Impulses are applied color by color, in the order of warm starting.
 
 use crate::engine::constraints::kernels::frame::{INV_INERTIA, INV_MASS, VX, VY, W};
 use crate::engine::constraints::records::batches::{Batches, SegmentRecords};
@@ -10,7 +10,7 @@ use crate::engine::constraints::records::point_vector::places;
 use crate::engine::constraints::records::segment::Segment;
 use crate::engine::lanes::{Block, BodyRow, LaneIndex, Lanes, prefetch};
 
-/// Input of a pass: bodies, and one set of batches with its part of a vector.
+/// Input of a pass: the bodies, and one set of batches with its part of a vector.
 pub(crate) struct VectorInput<'a> {
     pub rows: &'a mut [BodyRow],
     pub batches: &'a mut Batches,
@@ -18,8 +18,8 @@ pub(crate) struct VectorInput<'a> {
     pub vector: &'a mut [Block],
 }
 
-/// Two quantities of each point, by their places in a record, into the vector; of a scene without
-/// friction the second is zero.
+/// Reads two quantities of each point into the vector. `of` gives their indices in a record. Without
+/// friction, the second is zero.
 #[inline(never)]
 pub(crate) fn read<L: Lanes>(on: VectorInput<'_>, of: impl Fn(&Layout) -> [usize; 2]) {
     each_batch::<L>(on, |_, layout, _, record, _, vector, slot| {
@@ -32,7 +32,7 @@ pub(crate) fn read<L: Lanes>(on: VectorInput<'_>, of: impl Fn(&Layout) -> [usize
     });
 }
 
-/// Coulomb coefficients of each point take the place of tangential entries, and separations that of normal ones.
+/// Reads separations into the normal entries, and Coulomb coefficients into the tangential ones.
 #[inline(never)]
 pub(crate) fn read_surfaces<L: Lanes>(on: VectorInput<'_>) {
     each_batch::<L>(on, |_, layout, _, record, _, vector, slot| {
@@ -46,7 +46,7 @@ pub(crate) fn read_surfaces<L: Lanes>(on: VectorInput<'_>) {
     });
 }
 
-/// The vector becomes the accumulated impulses.
+/// Copies the vector into the accumulated impulses.
 #[inline(never)]
 pub(crate) fn write_impulses<L: Lanes>(on: VectorInput<'_>) {
     each_batch::<L>(on, |_, layout, _, record, _, vector, slot| {
@@ -60,7 +60,7 @@ pub(crate) fn write_impulses<L: Lanes>(on: VectorInput<'_>) {
     });
 }
 
-/// The vector becomes J v.
+/// Sets the vector to J v.
 #[inline(never)]
 pub(crate) fn read_velocities<L: Lanes>(on: VectorInput<'_>) {
     each_batch::<L>(on, |rows, layout, _, record, [row_a, row_b], vector, slot| {
@@ -74,14 +74,14 @@ pub(crate) fn read_velocities<L: Lanes>(on: VectorInput<'_>) {
             for (axis, place) in places::<L>(slot, p).into_iter().enumerate() {
                 let [arm_a, arm_b] = arms(record, layout, p, axis);
                 let v = a[W].neg_mul_add(arm_a, b[W].mul_add(arm_b, along[axis]));
-                // A point that is not there has no mass.
+                // An absent point has no mass.
                 vector[place] = mass.select_positive(v, L::zero());
             }
         }
     });
 }
 
-/// v ← v + M⁻¹ Jᵀ Δλ, the vector being Δλ.
+/// v ← v + M⁻¹ Jᵀ Δλ, where the vector is Δλ.
 #[inline(never)]
 pub(crate) fn push<L: Lanes>(on: VectorInput<'_>) {
     each_batch::<L>(on, |rows, layout, segment, record, [row_a, row_b], vector, slot| {
@@ -118,7 +118,7 @@ pub(crate) fn push<L: Lanes>(on: VectorInput<'_>) {
     });
 }
 
-/// Arms r × u of bodies a and b, u = n or t; zero where nothing turns.
+/// Arms r × u of bodies a and b, u = n or t. Zero for a body that does not turn.
 #[inline(always)]
 fn arms<L: Lanes>(record: &[L], layout: &Layout, p: usize, axis: usize) -> [L; 2] {
     let [turns_b, turns_a] = layout.has_arms;

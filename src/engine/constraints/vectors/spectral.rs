@@ -1,10 +1,11 @@
-//! The step's problem as a quadratic program in impulses, and its descent by spectral projected gradients.
+//! The problem of a step as a quadratic program in impulses, solved by spectral projected gradients.
 //!
 //! ```text
 //! f(λ) = ½ λᵀ (K + R) λ + λᵀ (J v* + b),   g = J v(λ) + b + R λ
 //! ```
 //!
-//! with v(λ) = v* + M⁻¹ Jᵀ λ, which the bodies' rows hold. In each iteration, with D the effective masses,
+//! where v(λ) = v* + M⁻¹ Jᵀ λ are the current velocities of the bodies. With D the effective masses, each
+//! iteration is
 //!
 //! ```text
 //! d = Π(λ − α D g) − λ
@@ -12,8 +13,9 @@
 //! α ← |Δλ|²_{D⁻¹}/(Δλ·Δg)   or   Δλ·Δg/|Δg|²_D   in turn
 //! ```
 //!
-//! The first α is 1/(second difference of f along Δλ), the second the same of the inverse; they are longer than steps of descent
-//! allow, and f need not fall in every one of them (`barzilai1988`, `birgin2000`). f is quadratic, so that s costs two sums and no pass:
+//! The first α is the inverse of the curvature of f along Δλ. The second is the same for the inverse of
+//! the matrix. These steps are longer than monotone descent allows, and f need not fall in each
+//! (`barzilai1988`, `birgin2000`). f is quadratic, so a trial of s costs two sums and no pass:
 //!
 //! ```text
 //! f(λ + s d) = f(λ) + s g·d + ½ s² d·(K + R) d
@@ -26,28 +28,29 @@ use crate::engine::constraints::records::point_vector::{
 use crate::engine::constraints::vectors::system::System;
 use crate::engine::lanes::Lanes;
 
-/// b, with µ of each point in its second entries, and D.
+/// b, µ of each point in its second entries, and D.
 #[derive(Debug)]
 pub struct ImpulseProblem {
-    /// b (m/s or rad/s) and µ; below zero where no point is.
+    /// b (m/s or rad/s) and µ. A negative µ marks rows of joints.
     pub bias: PointVector,
     /// D (kg)
     pub mass: PointVector,
 }
 
-/// The impulses of contacts that change.
+/// Impulses of contacts that a descent changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axes {
     /// Both.
     Both,
-    /// Those along n.
+    /// Along n only.
     Normal,
-    /// Those along t.
+    /// Along t only.
     Tangent,
 }
 
 impl ImpulseProblem {
-    /// Overlap is pushed apart by `rule`. `alike`: D is the same along n and t, so that cones stay cones.
+    /// Reads the problem of a step. `rule` pushes overlap apart. With `alike`, D is the same along n and
+    /// t, so that cones stay cones.
     pub fn begin(&mut self, system: &mut System<'_>, rule: &Baumgarte, alike: bool) {
         system.lane_surfaces(&mut self.bias);
         update([&mut self.bias], [], |[b], []| [[rule.bias(b[0]), b[1]]]);
@@ -58,14 +61,14 @@ impl ImpulseProblem {
         }
     }
 
-    /// g = J v + b + R λ, b along n alone.
+    /// g = J v + b + R λ. For contacts, b acts along n only.
     pub fn gradient(&self, system: &mut System<'_>, lambda: &mut PointVector, to: &mut PointVector) {
         system.lane_velocities(to);
         update([to], [&self.bias], |[g], [b]| [[g[0] + b[0], g[1]]]);
         system.soften_lanes(to, lambda);
     }
 
-    /// The same, zero along what does not change.
+    /// The same, with zeros for impulses that do not change.
     fn gradient_along(
         &self,
         system: &mut System<'_>,
@@ -86,20 +89,20 @@ impl ImpulseProblem {
     }
 }
 
-/// Values of f that the next one is compared with.
+/// Number of values of f with which the next one is compared.
 const REMEMBERED: usize = 10;
-/// Trials of s in one iteration.
+/// Maximum number of trials of s in one iteration.
 const TRIALS: usize = 4;
-/// Least and greatest s in parts of the last one.
+/// Smallest and largest s, as fractions of the previous one.
 const SHORTER: [f64; 2] = [0.1, 0.9];
-/// γ: share of the decrease that the slope promises.
+/// γ: required fraction of the decrease that the slope predicts.
 const DECREASE: f64 = 1e-4;
-/// Greatest α (1): beyond it what rounding leaves of g becomes impulses.
+/// Largest α (1). Beyond it, rounding errors of g turn into impulses.
 const LONGEST: f64 = 1e4;
-/// |d| over |λ| at which nothing is left to do: a few roundings.
+/// |d| ÷ |λ| at which the descent ends: a few rounding errors.
 const STILL: f64 = 1e-7;
 
-/// A descent on its way.
+/// State of a descent.
 #[derive(Debug)]
 pub struct SpectralDescent {
     /// λ
@@ -109,7 +112,7 @@ pub struct SpectralDescent {
     next_gradient: PointVector,
     direction: PointVector,
     best: PointVector,
-    /// f since the beginning (J), and the least of it.
+    /// The last values of f, relative to the start (J); the current one; and the smallest so far.
     values: [f64; REMEMBERED],
     value: f64,
     least: f64,
@@ -120,7 +123,7 @@ pub struct SpectralDescent {
 }
 
 impl SpectralDescent {
-    /// A descent that works in these vectors.
+    /// A descent that works in the given vectors.
     pub fn new([now, gradient, next, next_gradient, direction, best]: [PointVector; 6]) -> Self {
         let values = [f64::NEG_INFINITY; REMEMBERED];
         SpectralDescent {
@@ -139,12 +142,12 @@ impl SpectralDescent {
         }
     }
 
-    /// Its vectors, to be given back.
+    /// The vectors, to return to the workspace.
     pub fn vectors(self) -> [PointVector; 6] {
         [self.now, self.gradient, self.next, self.next_gradient, self.direction, self.best]
     }
 
-    /// From the impulses of the records, which velocities follow, and the nearest ones that `project` allows.
+    /// Starts from the impulses of the records, projected by `project`. Velocities are updated to match.
     pub fn begin(
         &mut self,
         system: &mut System<'_>,
@@ -167,8 +170,8 @@ impl SpectralDescent {
         self.values[0] = 0.0;
     }
 
-    /// One iteration. `project(λ, µ)` is the nearest allowed point to λ, µ below zero where no contact is; joints have their
-    /// own bounds. False if nothing is left to do.
+    /// One iteration. `project(λ, µ)` is the allowed point nearest to λ. A negative µ marks rows of
+    /// joints, which have bounds of their own. Returns `false` if the descent has ended.
     pub fn advance(
         &mut self,
         system: &mut System<'_>,
@@ -191,7 +194,7 @@ impl SpectralDescent {
             update([direction], [next, now], |_, [next, now]| [difference(next, now)]);
         }
         let way = sum_of_products([direction, &problem.mass], |[d, mass]| [d, quotient(d, mass)]);
-        // Rounding of g grows with α.
+        // The rounding error of g grows with α.
         let still = (STILL * self.length.max(1.0)).powi(2);
         if way <= still * sum_of_products([now, &problem.mass], |[now, mass]| [now, quotient(now, mass)]) {
             return false;
@@ -202,7 +205,7 @@ impl SpectralDescent {
         let curve = sum_of_products([direction, next_gradient, gradient], |[d, next, now]| {
             [d, difference(next, now)]
         });
-        // Along d: the value at s, and the first s that is low enough.
+        // The value of f at s along d, and the first s with a low enough value.
         let along = |s: f64| self.value + s * slope + 0.5 * s * s * curve;
         let highest = self.values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let mut s = 1.0;
@@ -219,7 +222,7 @@ impl SpectralDescent {
                 [now, gradient, &problem.bias],
                 |[next, next_gradient, _], [now, gradient, bias]| {
                     let change = difference(next_gradient, gradient);
-                    // Between two allowed points, but for rounding.
+                    // Lies between two allowed points, except for rounding.
                     let between = project(plus_scaled(now, part, difference(next, now)), bias[1]);
                     [between, plus_scaled(gradient, part, change), difference(between, next)]
                 },
@@ -251,8 +254,8 @@ impl SpectralDescent {
         true
     }
 
-    /// Goes back to the least f, from which velocities are at most √(2 (f − f*)) off in the mass norm, and makes it the
-    /// impulses of the records.
+    /// Returns to the smallest f, where velocities are at most √(2 (f − f*)) off in the mass norm, and
+    /// stores its impulses in the records.
     pub fn end(&mut self, system: &mut System<'_>) {
         if self.value > self.least {
             update([&mut self.direction], [&self.best, &self.now], |_, [best, now]| [difference(best, now)]);

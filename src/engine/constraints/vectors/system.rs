@@ -1,11 +1,11 @@
-//! The step's problem as vectors: λ of all contact points, v of all bodies, and J between them.
+//! The problem of a step as vectors: λ of all contact points, v of all bodies, and J between them.
 //!
 //! For methods that need more than one row at a time: conjugate gradients, projected gradients,
-//! acceleration, stopping by a residual. Vectors are of two kinds. A [`PointVector`] has the order of the
-//! lanes, and all that is done with it is done in lanes. A list of [`Pair`]s is in contact order with two
-//! points a contact, absent points zero, for who looks at single contacts. Sums over either have
-//! the same bits at every width. One entry of a λ or of a relative velocity is `[normal, tangential]`,
-//! along n and t = (n_y, −n_x) on body b.
+//! acceleration, stopping by a residual. There are two kinds of vectors. A [`PointVector`] has the order
+//! of the lanes, and all operations on it run in lanes. A list of [`Pair`]s is in contact order with two
+//! points per contact, absent points being zero, for methods that look at single contacts. Sums over
+//! either have the same bits at every width. An entry of λ or of a relative velocity is
+//! `[normal, tangential]`, along n and t = (n_y, −n_x) on body b.
 
 use crate::engine::clock::{Clock, Phase};
 use crate::engine::constraints::kernels::pass::{PassMode, PassWidth, VectorTask, at_width};
@@ -22,7 +22,7 @@ use crate::engine::narrowphase::lanes::PoseRow;
 /// `[normal, tangential]` of one contact point.
 pub type Pair = [f32; 2];
 
-/// A view of the step's problem; see the [module](self).
+/// A view of the problem of a step; see the [module](self).
 pub struct System<'a> {
     pub(super) rows: &'a mut [BodyRow],
     batches: [&'a mut Batches; 2],
@@ -33,19 +33,19 @@ pub struct System<'a> {
     width: LaneWidth,
 }
 
-/// Constraints of other types than contacts.
+/// Constraints of types other than contacts.
 pub(crate) struct Others<'a> {
     pub types: &'a mut [Joined],
     pub poses: &'a [PoseRow],
-    /// Substep (s).
+    /// Length of the substep (s).
     pub h: f32,
     pub counted: bool,
-    /// Springs and motors have acted in this substep.
+    /// Whether springs and motors have already acted in this substep.
     pub driven: bool,
 }
 
 impl Others<'_> {
-    /// A pass over all of them; each takes its part of the vectors.
+    /// Runs a pass over all types. Each takes its part of the vectors.
     pub fn run(
         &mut self,
         rows: &mut [BodyRow],
@@ -95,15 +95,15 @@ impl<'a> System<'a> {
         self.over_others(VectorTask::Impulses, Softness::RIGID, to, None);
     }
 
-    /// Replaces all accumulated impulses (N·s), in lanes; velocities stay as they are.
+    /// Replaces all accumulated impulses (N·s), in lanes. Velocities do not change.
     pub fn set_lane_impulses(&mut self, from: &mut PointVector) {
         self.book_points([8.0, 8.0]);
         self.over_lanes(from, |width, on| at_width!(width, passes::write_impulses(on)));
         self.over_others(VectorTask::SetImpulses, Softness::RIGID, from, None);
     }
 
-    /// Effective masses 1/(J M⁻¹ Jᵀ) of the normal and the tangential row of each point (kg), in lanes; of the
-    /// normal row alone in a scene without friction. Of rows of joints 1/(J M⁻¹ Jᵀ + R).
+    /// Effective masses 1/(J M⁻¹ Jᵀ) of the normal and the tangential row of each point (kg), in lanes.
+    /// Without friction, only those of normal rows. For rows of joints, 1/(J M⁻¹ Jᵀ + R).
     pub fn lane_masses(&mut self, to: &mut PointVector) {
         let of = |layout: &Layout| [layout.normal_mass, layout.tangent_mass];
         self.book_points([8.0, 8.0]);
@@ -111,7 +111,8 @@ impl<'a> System<'a> {
         self.over_others(VectorTask::Masses, Softness::RIGID, to, None);
     }
 
-    /// Separation at the start of the step (m) and Coulomb coefficient of each point, in lanes; −1 marks what is no contact.
+    /// Separation at the start of the step (m) and Coulomb coefficient of each point, in lanes. A
+    /// coefficient of −1 marks entries that are not contacts.
     pub fn lane_surfaces(&mut self, to: &mut PointVector) {
         self.book_points([8.0, 8.0]);
         self.over_lanes(to, |width, on| at_width!(width, passes::read_surfaces(on)));
@@ -121,14 +122,14 @@ impl<'a> System<'a> {
         }
     }
 
-    /// J v: how fast the surfaces part and slide at each point (m/s), in lanes.
+    /// J v: separating and sliding speed of the surfaces at each point (m/s), in lanes.
     pub fn lane_velocities(&mut self, to: &mut PointVector) {
         self.book_points([GEOMETRY, 8.0]);
         self.over_lanes(to, |width, on| at_width!(width, passes::read_velocities(on)));
         self.over_others(VectorTask::Velocities, Softness::RIGID, to, None);
     }
 
-    /// v ← v + M⁻¹ Jᵀ Δλ, in lanes, in the order of the lanes. Accumulated impulses stay as they are.
+    /// v ← v + M⁻¹ Jᵀ Δλ, in the order of the lanes. Accumulated impulses do not change.
     pub fn push_lanes(&mut self, delta: &mut PointVector) {
         self.book_points([8.0 + GEOMETRY, 32.0]);
         self.over_lanes(delta, |width, on| at_width!(width, passes::push(on)));
@@ -140,27 +141,29 @@ impl<'a> System<'a> {
         self.others.types.iter().any(|joined| joined.kind.rows() > 0)
     }
 
-    /// b of rows of joints under `law` (m/s or rad/s), in lanes; contacts stay as they are.
+    /// b of rows of joints under `law` (m/s or rad/s), in lanes. Entries of contacts do not change.
     pub fn lane_bias(&mut self, law: Softness, to: &mut PointVector) {
         self.over_others(VectorTask::Bias, law, to, None);
     }
 
-    /// x ← x + R y of rows of joints, in lanes; contacts stay as they are.
+    /// x ← x + R y for rows of joints, in lanes. Entries of contacts do not change.
     pub fn soften_lanes(&mut self, x: &mut PointVector, y: &mut PointVector) {
         self.over_others(VectorTask::Soften, Softness::RIGID, x, Some(y));
     }
 
-    /// x ← (1 + Y R)⁻¹ x of rows of joints, Y being diagonal with the entries of `y`, in lanes; contacts stay as they are.
+    /// x ← (1 + Y R)⁻¹ x for rows of joints, in lanes. Y is diagonal with the entries of `y`. Entries of
+    /// contacts do not change.
     pub fn yield_lanes(&mut self, x: &mut PointVector, y: &mut PointVector) {
         self.over_others(VectorTask::Yield, Softness::RIGID, x, Some(y));
     }
 
-    /// Impulses of joints become the nearest ones within their bounds, in lanes; contacts stay as they are.
+    /// Replaces impulses of joints by the nearest ones within their bounds, in lanes. Entries of contacts
+    /// do not change.
     pub fn bound_lanes(&mut self, x: &mut PointVector) {
         self.over_others(VectorTask::Bound, Softness::RIGID, x, None);
     }
 
-    /// A pass between impulses of joints and vectors.
+    /// Runs a pass between impulses of joints and vectors.
     fn over_others(
         &mut self,
         task: VectorTask,
@@ -177,15 +180,15 @@ impl<'a> System<'a> {
         self.others.run(self.rows, self.width, (Phase::Solve, PassMode::Vector(task)), law, [x, y]);
     }
 
-    /// A pass over constraints of other types than contacts.
+    /// Runs a pass over constraints of types other than contacts.
     pub(super) fn over_types(&mut self, phase: Phase, mode: PassMode) {
         self.others.run(self.rows, self.width, (phase, mode), Softness::RIGID, [&mut [], &mut []]);
     }
 
-    /// Colored batches at their width, then serial ones at one lane.
+    /// Runs a pass over colored batches at their width, then over serial ones at one lane.
     ///
     /// # Panics
-    /// If the vector is of other contacts.
+    /// If the vector belongs to other contacts.
     fn over_lanes(&mut self, vector: &mut PointVector, pass: impl Fn(LaneWidth, VectorInput<'_>)) {
         let [lanes, serial] = &mut self.batches;
         let parts = vector.parts([lanes, serial]);
@@ -196,7 +199,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// Entries of every vector over contact points: two a contact.
+    /// Number of entries of a vector over contact points: two per contact.
     pub fn len(&self) -> usize {
         2 * self.contacts.len()
     }
@@ -206,7 +209,7 @@ impl<'a> System<'a> {
         self.contacts.is_empty()
     }
 
-    /// Velocities and inverse masses, a row per body and an inert one at the end.
+    /// Velocities and inverse masses: one row per body, and an inert one at the end.
     pub fn rows(&mut self) -> &mut [BodyRow] {
         self.rows
     }
@@ -221,7 +224,7 @@ impl<'a> System<'a> {
         });
     }
 
-    /// Replaces all accumulated impulses (N·s); velocities stay as they are.
+    /// Replaces all accumulated impulses (N·s). Velocities do not change.
     ///
     /// # Panics
     /// If `from` is not [`Self::len`] long.
@@ -236,7 +239,7 @@ impl<'a> System<'a> {
         });
     }
 
-    /// J v: how fast the surfaces part and slide at each point (m/s).
+    /// J v: separating and sliding speed of the surfaces at each point (m/s).
     pub fn relative_velocities(&mut self, to: &mut Vec<Pair>) {
         to.clear();
         to.resize(self.len(), [0.0; 2]);
@@ -247,7 +250,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// v ← v + M⁻¹ Jᵀ Δλ, point after point. Accumulated impulses stay as they are.
+    /// v ← v + M⁻¹ Jᵀ Δλ, point by point. Accumulated impulses do not change.
     ///
     /// # Panics
     /// If `delta` is not [`Self::len`] long.
@@ -270,14 +273,15 @@ impl<'a> System<'a> {
         }
     }
 
-    /// The greatest violation of the rigid contact law, in N·s: over all points the natural map
+    /// The largest violation of the rigid contact law (N·s): the maximum of the natural map over all
+    /// points,
     ///
     /// ```text
     /// λn − max(0, λn − m_n (vn + max(s, 0)/h)),   λt − clamp(λt − m_t vt, ±µ λn)
     /// ```
     ///
-    /// with the effective masses m and the separation s (m) at the start of the step. Zero exactly
-    /// where a rigid sweep would change nothing.
+    /// with the effective masses m and the separation s (m) at the start of the step. Zero exactly if a
+    /// rigid sweep would change nothing.
     pub fn residual(&mut self, h: f32) -> f64 {
         self.book_points([128.0, 0.0]);
         let view = Points { rows: self.rows, contacts: self.contacts, features: self.features };
@@ -308,7 +312,8 @@ impl<'a> System<'a> {
         x.iter().zip(y).map(product).sum()
     }
 
-    /// Separation at the start of the step (m) and Coulomb coefficient of each point; zero of absent ones.
+    /// Separation at the start of the step (m) and Coulomb coefficient of each point. Zero for absent
+    /// points.
     pub fn gaps_and_friction(&self, to: &mut Vec<Pair>) {
         to.clear();
         to.resize(self.len(), [0.0; 2]);
@@ -319,7 +324,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// Components of the Jacobian of a point; see [`PointRows`].
+    /// Rows of the Jacobian for each point; see [`PointRows`].
     pub fn point_rows(&self) -> impl Iterator<Item = PointRows> {
         self.view().points().map(|(at, bodies, axes, arms)| PointRows { at, bodies, axes, arms })
     }
@@ -328,12 +333,12 @@ impl<'a> System<'a> {
         Points { rows: self.rows, contacts: self.contacts, features: self.features }
     }
 
-    /// Books bytes read and written.
+    /// Records the number of bytes read and written.
     pub fn book(&mut self, bytes: [f64; 2]) {
         self.clock.book_bytes(bytes);
     }
 
-    /// Books bytes read and written of each contact point.
+    /// Records the number of bytes read and written, given per contact point.
     fn book_points(&mut self, bytes: [f64; 2]) {
         let points = self.len() as f64;
         self.clock.book_bytes(bytes.map(|b| points * b));
@@ -343,9 +348,9 @@ impl<'a> System<'a> {
 /// The normal and the tangential row of one contact point.
 #[derive(Clone, Copy, Debug)]
 pub struct PointRows {
-    /// Its place in vectors.
+    /// Its index in vectors.
     pub at: usize,
-    /// Bodies a and b; what is no row is the world.
+    /// Bodies a and b. An index without a row is the world.
     pub bodies: [u32; 2],
     /// n and t.
     pub axes: [[f32; 2]; 2],
@@ -354,7 +359,8 @@ pub struct PointRows {
 }
 
 impl PointRows {
-    /// J of its row along n (`axis` 0) or t on body a or b: `[u, r × u]` with the sign of its side.
+    /// Row of J along n (`axis` 0) or t on body a (`side` 0) or b: `[u, r × u]`, with the sign of the
+    /// side.
     pub fn on(&self, side: usize, axis: usize) -> [f64; 3] {
         let sign = if side == 0 { -1.0 } else { 1.0 };
         let [x, y] = self.axes[axis];
@@ -362,7 +368,7 @@ impl PointRows {
     }
 }
 
-/// Bytes of a point's geometry and its two bodies.
+/// Bytes of the geometry of a point and of its two bodies.
 const GEOMETRY: f64 = 32.0 + 2.0 * 32.0;
 
 /// Quantities that do not depend on impulses.
@@ -382,7 +388,7 @@ impl<'a> Points<'a> {
         if k > 0.0 { 1.0 / k } else { 0.0 }
     }
 
-    /// A body's row; what is no body does not move.
+    /// Row of a body. An index that is not a body has an inert row.
     fn row(&self, body: u32) -> BodyRow {
         self.rows.get(body as usize).copied().unwrap_or_default()
     }
@@ -395,7 +401,7 @@ impl<'a> Points<'a> {
         [along(n, arms_n), along(t, arms_t)]
     }
 
-    /// Every point in use, see [`Self::point`].
+    /// All points in use; see [`Self::point`].
     fn points(self) -> impl Iterator<Item = (usize, [u32; 2], [[f32; 2]; 2], [Pair; 2])> + use<'a> {
         self.contacts
             .iter()
@@ -403,7 +409,8 @@ impl<'a> Points<'a> {
             .flat_map(move |(contact, c)| (0..c.manifold.count as usize).map(move |p| self.point(contact, p)))
     }
 
-    /// Its place in vectors, its bodies, n and t, and the arms `[r_a × u, r_b × u]` for u = n and t.
+    /// Index of a point in vectors, its bodies, n and t, and the arms `[r_a × u, r_b × u]` for u = n and
+    /// t.
     fn point(&self, contact: usize, p: usize) -> (usize, [u32; 2], [[f32; 2]; 2], [Pair; 2]) {
         let c = &self.contacts[contact];
         let (n, point) = (c.manifold.normal, &c.manifold.points[p]);
@@ -414,7 +421,7 @@ impl<'a> Points<'a> {
     }
 }
 
-/// Calls `visit(place in vectors, λn, λt if the scene has friction)` for every point of every record.
+/// Calls `visit(index in vectors, λn, λt if the scene has friction)` for every point of every record.
 fn each_record(
     batches: &mut [&mut Batches; 2],
     features: &Features,

@@ -1,12 +1,12 @@
-//! The convex problem in the velocities of bodies, and Newton's method on it. In `f64`, one lane.
+//! The convex problem in the velocities of the bodies, and Newton's method on it. In `f64`, one lane.
 //!
 //! ```text
 //! ℓ(v) = ½ (v − v*)ᵀ M (v − v*) + Σ ½ γᵀ R γ,   γ(v) = the impulse within bounds that is nearest to y in the norm of R
 //! y = R⁻¹ (v̂ − J v),   ∇ℓ = M (v − v*) − Jᵀ γ,   H = M + Σ Jᵀ G J,   G = −∂γ/∂(J v)
 //! ```
 //!
-//! ℓ is strictly convex, and once differentiable: γ is continuous. With e = v̂ − J v of a contact, R = diag(R_n, R_t),
-//! s = sign(e_t) and w = (1, µ s),
+//! ℓ is strictly convex and once differentiable: γ is continuous. With e = v̂ − J v of a contact,
+//! R = diag(R_n, R_t), s = sign(e_t) and w = (1, µ s),
 //!
 //! ```text
 //! sticks  |y_t| < µ y_n                 γ = y                              G = R⁻¹
@@ -14,13 +14,15 @@
 //! open    else                          γ = 0                              G = 0
 //! ```
 //!
-//! since the nearest point of an edge to y is w (wᵀ R y)/(wᵀ R w). Rows of joints are free, or have γ ≥ 0, or |γ| ≤ c:
+//! since the point of an edge nearest to y is w (wᵀ R y)/(wᵀ R w). Rows of joints are free, or have
+//! γ ≥ 0, or |γ| ≤ c:
 //!
 //! ```text
 //! |y| > c     γ = B e,   B = (R + η 1)⁻¹ with |B e| = c     G = B − B γ γᵀ B/(γᵀ B γ)
 //! ```
 //!
-//! In the plane γ is linear in pieces, and so is ∇ℓ where nothing has the third bound: Newton's method ends after finitely many steps.
+//! In the plane, γ of a contact is piecewise linear. If no block has the bound |γ| ≤ c, ∇ℓ is piecewise
+//! linear as well, and Newton's method ends after finitely many steps.
 
 use crate::engine::constraints::System;
 use crate::engine::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
@@ -33,32 +35,34 @@ use crate::engine::lanes::BodyRow;
 /// A block of three rows and columns.
 type Block3 = [[f64; 3]; 3];
 
-/// Norm of the gradient, relative to that of momenta and impulses, at which the problem is solved: below what f32 resolves.
+/// Norm of the gradient, relative to that of momenta and impulses, at which the problem counts as solved.
+/// Below the resolution of f32.
 const TOLERANCE: f64 = 1e-9;
-/// Trials of a line search.
+/// Maximum number of iterations in a line search and in the search for η.
 const TRIALS: usize = 30;
-/// Slope at the end of a line search, relative to that at its beginning.
+/// Slope at the end of a line search, relative to that at its start.
 const FLAT: f64 = 1e-8;
-/// R of rigid rows of joints over J M⁻¹ Jᵀ.
+/// R ÷ J M⁻¹ Jᵀ of rigid joint rows.
 const RIGID: f64 = 1e-8;
-/// Steps of conjugate gradients for one of Newton's, and the residual at which they end.
+/// Maximum number of conjugate-gradient iterations per Newton step, and the relative residual at which
+/// they end.
 const INNER: usize = 200;
 const INNER_TOLERANCE: f64 = 1e-4;
 
-/// What does not move has this number.
+/// Number of a body that does not move.
 const FIXED: usize = usize::MAX;
 
-/// A body that moves.
+/// A moving body.
 #[derive(Clone, Copy, Debug)]
 struct MovingBody {
     row: usize,
-    /// Mass, mass, inertia; one where it is infinite.
+    /// Mass, mass, inertia; 1 if infinite.
     mass: [f64; 3],
     /// v*
     free: [f64; 3],
 }
 
-/// What bounds γ.
+/// Bound on γ.
 #[derive(Clone, Copy, Debug)]
 enum ImpulseBound {
     /// |γ_t| ≤ µ γ_n; R is diagonal.
@@ -73,40 +77,40 @@ enum ImpulseBound {
 struct ConvexBlock {
     bodies: [usize; 2],
     size: usize,
-    /// Of a and b.
+    /// J of bodies a and b.
     jacobian: [Block3; 2],
-    /// v̂, less what bodies that do not move add.
+    /// v̂, less the velocity of fixed bodies along the rows.
     target: [f64; 3],
     softness: Block3,
     /// R⁻¹
     inverse: Block3,
     bound: ImpulseBound,
-    /// e, γ and G now.
+    /// Current e, γ and G.
     error: [f64; 3],
     impulse: [f64; 3],
     stiffness: Block3,
 }
 
-/// Newton's method on its way.
+/// State of Newton's method.
 #[derive(Debug, Default)]
 pub struct Convex {
     bodies: Vec<MovingBody>,
-    /// Of contact points, then of joints.
+    /// Blocks of contact points, then of joints.
     blocks: Vec<ConvexBlock>,
-    /// Places of the points in vectors.
+    /// Indices of the points in vectors.
     places: Vec<usize>,
     joints: JointBlocks,
     velocities: Vec<[f64; 3]>,
     gradient: Vec<[f64; 3]>,
     direction: Vec<[f64; 3]>,
-    /// J of the direction, block by block.
+    /// J times the direction, per block.
     change: Vec<[f64; 3]>,
     matrix: Envelope,
-    /// Whether the matrix has its pattern.
+    /// Whether the pattern of the matrix is set.
     is_coupled: bool,
     most_work: f64,
     pub is_solved: bool,
-    /// Norm of the gradient relative to momenta and impulses.
+    /// Norm of the gradient, relative to that of momenta and impulses.
     pub residual: f64,
 }
 
@@ -118,7 +122,7 @@ fn times(m: &Block3, x: [f64; 3]) -> [f64; 3] {
     m.map(|row| dot(row, x))
 }
 
-/// The inverse of a symmetric positive definite block of so many rows; others are zero.
+/// The inverse of a symmetric positive definite block of `size` rows. Other rows are zero.
 fn inverse(m: &Block3, size: usize) -> Block3 {
     let (mut m, mut to) = (*m, [[0.0; 3]; 3]);
     (0..size).for_each(|i| to[i][i] = 1.0);
@@ -137,7 +141,7 @@ fn inverse(m: &Block3, size: usize) -> Block3 {
 }
 
 impl ConvexBlock {
-    /// γ and G at an error e.
+    /// γ and G for an error e.
     fn at(&self, e: [f64; 3]) -> ([f64; 3], Block3) {
         let y = times(&self.inverse, e);
         let sticks = (y, self.inverse);
@@ -171,7 +175,8 @@ impl ConvexBlock {
                 if cap <= 0.0 {
                     return open;
                 }
-                // |B e| falls and is convex as η grows: Newton's method on 1/|B e| = 1/c does not go too far.
+                // |B e| falls and is convex as η grows, so Newton's method on 1/|B e| = 1/c does not
+                // overshoot.
                 let (mut shift, mut b, mut impulse) = (0.0, self.inverse, y);
                 for _ in 0..TRIALS {
                     let bent = dot(impulse, times(&b, impulse));
@@ -196,7 +201,7 @@ impl ConvexBlock {
         }
     }
 
-    /// J of velocities of bodies that move.
+    /// J v of moving bodies.
     fn speed(&self, v: &[[f64; 3]]) -> [f64; 3] {
         let of = |side: usize| match v.get(self.bodies[side]) {
             Some(&v) => times(&self.jacobian[side], v),
@@ -216,7 +221,7 @@ impl ConvexBlock {
         }
     }
 
-    /// J_rowᵀ G J_column of two sides.
+    /// J_rowᵀ G J_column, where `row` and `column` are sides of the block.
     fn curvature(&self, [row, column]: [usize; 2]) -> Block3 {
         let of = |entry: &dyn Fn(usize, usize, usize) -> f64| -> Block3 {
             let sum = |r, c| (0..self.size).map(|k| entry(r, c, k)).sum();
@@ -226,7 +231,7 @@ impl ConvexBlock {
         of(&|r, c, k| self.jacobian[row][k][r] * half[k][c])
     }
 
-    /// The pairs of sides whose blocks of H it is in, each block once.
+    /// Pairs of sides for which the block contributes to H, each once.
     fn couplings(&self) -> impl Iterator<Item = [usize; 2]> {
         let moves = self.bodies.map(|body| body != FIXED);
         let has = move |[row, column]: &[usize; 2]| moves[*row] && moves[*column];
@@ -235,8 +240,8 @@ impl ConvexBlock {
 }
 
 impl Convex {
-    /// Of a step whose bodies have the velocities v* now; with R of contacts over J M⁻¹ Jᵀ. Factorizations take `most_work`
-    /// multiplications at most.
+    /// The problem of a step, in which the bodies have the velocities v* now. `softness` is R ÷ J M⁻¹ Jᵀ
+    /// of contacts. Factorizations take at most `most_work` multiplications.
     pub fn new(system: &mut System<'_>, rule: &Baumgarte, softness: f64, h: f32, most_work: f64) -> Self {
         let mut problem = Convex { most_work, ..Convex::default() };
         let mut numbers = Vec::new();
@@ -255,7 +260,7 @@ impl Convex {
         let points: Vec<PointRows> = system.point_rows().collect();
         for point in &points {
             let [gap, friction] = surfaces[point.at];
-            // J of a point on one of its bodies, along u: ±u and ± r × u.
+            // J of a point on one of its bodies, along u: ±u and ±r × u.
             let on = |side: usize, axis: usize| {
                 let sign = if side == 0 { -1.0 } else { 1.0 };
                 let [x, y] = point.axes[axis];
@@ -274,7 +279,7 @@ impl Convex {
                 };
                 of(0) + of(1)
             });
-            // A row that nothing can move has no impulse.
+            // A row that moves no body has no impulse.
             for (r, k) in response.into_iter().enumerate() {
                 block.softness[r][r] = if k > 0.0 { softness * k } else { f64::MAX.sqrt() };
                 block.inverse[r][r] = 1.0 / block.softness[r][r];
@@ -293,7 +298,8 @@ impl Convex {
         problem
     }
 
-    /// A block with J, less what bodies that do not move add to its speed.
+    /// A block with Jacobian J. Components that cannot move are removed from J; their velocities are
+    /// subtracted from the target.
     fn placed(
         &self,
         rows: &[BodyRow],
@@ -329,7 +335,7 @@ impl Convex {
         }
     }
 
-    /// The block of a joint: R = K/D of a spring, little of K where it is rigid.
+    /// The block of a joint. R is K/D for a spring and a small multiple of K for a rigid row.
     fn of_joint(
         &self,
         rows: &[BodyRow],
@@ -355,7 +361,8 @@ impl Convex {
             for c in 0..joint.size {
                 block.softness[r][c] = scale * f64::from(joint.response[r][c]);
             }
-            // K of equal rows has no inverse. Rows of lengths and of angles differ in units, so each is raised by a part of its own.
+            // K of equal rows is singular. Rows of lengths and of angles differ in units, so each
+            // diagonal entry is raised by a fraction of itself.
             let own = f64::from(joint.response[r][r]);
             block.softness[r][r] += 1e-6 * scale * if own > 0.0 { own } else { largest };
         }
@@ -365,7 +372,7 @@ impl Convex {
         block
     }
 
-    /// From the velocities that the bodies have now.
+    /// Starts from the current velocities of the bodies.
     pub fn begin(&mut self, rows: &[BodyRow]) {
         let velocity = |body: &MovingBody| [0, 1, 2].map(|k| f64::from(rows[body.row].velocity[k]));
         self.velocities = self.bodies.iter().map(velocity).collect();
@@ -377,7 +384,7 @@ impl Convex {
 
     /// γ, G and the gradient at v.
     fn evaluate(&mut self) {
-        // Square norms of M v and Jᵀ γ, by M⁻¹.
+        // Squared norms of M v and Jᵀ γ, weighted by M⁻¹.
         let (mut momentum, mut pushed) = (0.0, 0.0);
         self.gradient.iter_mut().for_each(|g| *g = [0.0; 3]);
         for block in &mut self.blocks {
@@ -400,7 +407,7 @@ impl Convex {
         self.is_solved |= self.residual <= TOLERANCE;
     }
 
-    /// One step of Newton's method with an exact line search; returns whether one was taken.
+    /// One Newton step with an exact line search. Returns `false` if the problem was already solved.
     pub fn step(&mut self) -> bool {
         if self.is_solved {
             return false;
@@ -420,13 +427,13 @@ impl Convex {
         for (v, d) in self.velocities.iter_mut().zip(&self.direction) {
             (0..3).for_each(|c| v[c] += s * d[c]);
         }
-        // Rounding: nothing is gained any more.
+        // Because of rounding, no step lowers ℓ any further.
         self.is_solved = !(s > 0.0 && s.is_finite());
         self.evaluate();
         true
     }
 
-    /// The pattern of H.
+    /// Sets the pattern of H.
     fn couple(&mut self) {
         let n = self.bodies.len();
         let mut pairs: Vec<[usize; 2]> = Vec::new();
@@ -441,7 +448,7 @@ impl Convex {
         self.is_coupled = true;
     }
 
-    /// Replaces −∇ℓ by −H⁻¹ ∇ℓ; false if rounding does not allow it.
+    /// Replaces −∇ℓ by −H⁻¹ ∇ℓ. Returns `false` if rounding makes H indefinite.
     fn by_factor(&mut self) -> bool {
         self.matrix.clear();
         for (i, body) in self.bodies.iter().enumerate() {
@@ -461,7 +468,7 @@ impl Convex {
         true
     }
 
-    /// The same by conjugate gradients, preconditioned by the blocks on the diagonal of H.
+    /// The same by conjugate gradients, preconditioned by the diagonal blocks of H.
     fn by_gradients(&mut self) {
         let mut diagonal: Vec<Block3> = Vec::new();
         for MovingBody { mass: [x, y, turn], .. } in &self.bodies {
@@ -515,7 +522,8 @@ impl Convex {
         self.direction = found;
     }
 
-    /// How far ℓ falls along the direction: where its slope is zero, by Newton's method within what brackets it.
+    /// Step length along the direction: the zero of the slope of ℓ, found by Newton's method within a
+    /// bracket.
     ///
     /// ```text
     /// ℓ'(s) = dᵀ M (v − v*) + s dᵀ M d − Σ γ(e − s J d)·J d,   ℓ''(s) = dᵀ M d + Σ (J d)ᵀ G J d
@@ -557,7 +565,7 @@ impl Convex {
         s
     }
 
-    /// Velocities and impulses become those of the system.
+    /// Writes velocities and impulses to the system.
     pub fn write(&mut self, system: &mut System<'_>) {
         let bytes = |count: usize, each: usize| (count * each) as f64;
         let blocks = bytes(self.blocks.len(), size_of::<ConvexBlock>());
@@ -591,7 +599,7 @@ impl Convex {
 mod tests {
     use super::*;
 
-    /// The impulse is the gradient of a convex function: monotone, and its derivative is the one that is stated.
+    /// The impulse is the gradient of a convex function: it is monotone, and G is its derivative.
     #[test]
     fn impulses_are_monotone_and_have_the_stated_derivative() {
         let softness = [[2.0, 0.3, 0.0], [0.3, 1.0, 0.1], [0.0, 0.1, 1.5]];
@@ -617,7 +625,7 @@ mod tests {
                 impulse: [0.0; 3],
                 stiffness: zero,
             };
-            // Not the apex of a cone, where there is no derivative.
+            // None of these is the apex of a cone, which has no derivative.
             let errors: Vec<[f64; 3]> = (1..60)
                 .map(|i| {
                     [0, 1, 2]

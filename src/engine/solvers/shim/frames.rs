@@ -1,14 +1,14 @@
 //! The frame of a round contact in the middle of a step.
 //!
-//! A substep solver keeps the normal and the arms of a contact for all n substeps of a step. Where a round shape rolls
-//! they turn meanwhile:
+//! A substep solver keeps the normal and the arms of a contact for all n substeps of a step. If a round shape
+//! rolls, they turn during the step:
 //!
 //! ```text
 //! n(t) = d(t)/|d(t)|,    d(t) = d + u t
 //! ```
 //!
-//! with d from the center (or the corner) of one shape to the center of the other, and u the velocity between these. A
-//! force that keeps the direction of the step's beginning lags behind this one by
+//! with d from the center (or the corner) of one shape to the center of the other, and u their relative
+//! velocity. A force that keeps the direction of the start of the step lags behind this by
 //!
 //! ```text
 //! τ = (1 − 1/n) dt/2
@@ -43,7 +43,7 @@ use crate::engine::params::LINEAR_SLOP;
 /// Largest change of the gap of a rolling contact (m): a fifth of the slop.
 pub(super) const STEADY: f32 = 0.2 * LINEAR_SLOP;
 
-/// Radii above this are those of faces (m).
+/// Radius above which a shape is a face (m).
 const FLAT: f32 = 1e30;
 
 /// Turns the records of rolling contacts.

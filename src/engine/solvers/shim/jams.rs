@@ -16,23 +16,25 @@
 //! that are both deeper than the slop start a step without impulses. Within the step their normals stay fixed, so
 //! impulses that cancel keep canceling. Contacts of a wedge at rest are far less deep, and keep theirs.
 //!
-//! Bodies that welds hold to what does not move count as that: a rod between two planks of a beam has one body on both sides.
+//! Bodies welded to a static or kinematic body count as that body: a rod between two planks of a beam has one
+//! body on both sides.
 //!
 //! # Squeezes
 //!
-//! The same holds where a kinematic body leaves others no room. A body is in a squeeze if it touches a kinematic body, or
-//! contacts deeper than the slop connect it with one that does; it is in a jam there if two of its deep contacts oppose each
-//! other, whatever they are with. All contacts of such a body, also those that are not deep, start a step without impulses:
-//! three that press from three sides hold each other as well. Bodies under a heavy one, which are as deep in each other, keep
-//! their impulses.
+//! The same happens if a kinematic body leaves others no room. A body is in a squeeze if it touches a
+//! kinematic body, or contacts deeper than the slop connect it with one that does; it is in a jam there if
+//! two of its deep contacts oppose each other, whichever bodies they touch. All contacts of such a body, also
+//! those that are not deep, start a step without impulses: three that press from three sides hold each other
+//! as well. Bodies under a heavy one, which are as deep in each other, keep their impulses.
 //!
 //! # Bound of the speed
 //!
-//! Closing speed V between what squeezes cannot be removed, so each of the sweeps adds m V to impulses that cancel only as
-//! long as nothing yields. A body that gives way sideways by an angle φ from the direction of V would have to move at
-//! V/tan φ to make room: the contact law itself bounds no speed. Energy does. A kinematic body that hits one at rest without
-//! loss gives it 2V, and overlap is pushed apart at the push speed u. What is in a jam has overlap instead of more speed:
-//! with v₀, ω₀ from before the step, ρ the radius of gyration and V the fastest surface that presses its squeeze,
+//! The closing speed V of the squeezing surfaces cannot be removed, so each of the sweeps adds m V to
+//! impulses that cancel only as long as nothing yields. A body that gives way sideways by an angle φ from the
+//! direction of V would have to move at V/tan φ to make room: the contact law itself bounds no speed. Energy
+//! does. A kinematic body that hits one at rest without loss gives it 2V, and overlap is pushed apart at the
+//! push speed u. A jammed body is left with overlap instead of more speed: with v₀, ω₀ from before the step,
+//! ρ the radius of gyration and V the fastest surface that presses its squeeze,
 //!
 //! ```text
 //! v² + ρ²ω² ≤ max(2V + u, √(v₀² + ρ²ω₀²) + g dt)²
@@ -59,7 +61,7 @@ use crate::engine::narrowphase::Margins;
 /// Normals with a smaller product oppose each other (1).
 const OPPOSED: f32 = -0.5;
 
-/// A deep contact: the bodies that it is grouped by, its index, and whether its normal counts as it is.
+/// A deep contact: the bodies by which it is grouped, its index, and whether the normal keeps its sign.
 type DeepContact = ([u32; 2], u32, bool);
 
 /// Finds jams; reuses its memory from step to step.
@@ -74,7 +76,7 @@ pub(super) struct Jams {
     jammed: Vec<(u32, f32)>,
     /// Bodies that welds hold together.
     welded: DisjointSets,
-    /// Of such a set, at its least body: one that does not move, if there is one. `[bodies]`
+    /// Non-dynamic body of each welded set, if any, at the lowest index of the set. `[bodies]`
     holders: Vec<u32>,
 }
 
@@ -106,7 +108,6 @@ impl Jams {
             if body != same && bodies.is_dynamic(body as usize) && bodies.is_dynamic(same as usize) {
                 continue;
             }
-            // What one body is jammed in is found for the body alone.
             let room = if body == same && self.squeezed[body as usize] < 0.0 {
                 square_gyration(bodies, body).sqrt()
             } else {
@@ -143,7 +144,8 @@ impl Jams {
         }
     }
 
-    /// Bodies of deep contacts that welds hold to what does not move count as that, but not among themselves.
+    /// Replaces welded bodies of deep contacts by the non-dynamic body that holds them, except within one
+    /// set.
     fn hold(&mut self, types: &[Joined], bodies: &Bodies) {
         let welds =
             || types.iter().filter(|joined| joined.kind.rigid_size() == 3).flat_map(|j| j.kind.ends());
@@ -170,7 +172,7 @@ impl Jams {
         }
     }
 
-    /// No body is in a jam.
+    /// Clears the list of bodies in a jam.
     pub fn clear(&mut self) {
         self.jammed.clear();
     }

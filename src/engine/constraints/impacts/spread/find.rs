@@ -1,11 +1,12 @@
 //! Contacts that are hit in the coming step.
 //!
-//! A point is hit if it closes its gap within the step and approaches faster than resting bodies can. Forces alone give a speed of
-//! dt |a| in a step. A point that bounces has to approach faster than dt (|n·a_a| + |n·a_b|), and than a hundredth of dt |a_b|, and
-//! leave faster than a tenth of that. A
-//! point that only stops has to approach at twice the speed: 2 dt (|a_a| + |a_b|) between two bodies that others may push in any
-//! direction, and 2 dt |n·a_b| against a body that nothing pushes, so that a wall that starts to move is seen. Bodies with joints are
-//! not stopped: their joints, which an impact knows nothing of, would pull them on, step by step where a limb is caught in another.
+//! A point is hit if it closes its gap within the step and approaches faster than resting bodies can. Forces
+//! alone give a speed of dt |a| in a step. A point that bounces has to approach faster than dt (|n·a_a| +
+//! |n·a_b|), and than a hundredth of dt |a_b|, and leave faster than a tenth of that. A point that only stops
+//! has to approach at twice the speed: 2 dt (|a_a| + |a_b|) between two bodies that others may push in any
+//! direction, and 2 dt |n·a_b| against a body that nothing pushes, so that a wall that starts to move is
+//! detected. Bodies with joints are not stopped: impacts ignore joints, which would pull the bodies on, step
+//! by step if a limb is caught in another.
 
 use super::{AHEAD, BOUNCES};
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
@@ -26,7 +27,7 @@ pub(crate) struct Find<'a> {
     pub fastest: f32,
     /// Whether contacts may bounce.
     pub bounces: bool,
-    /// If points that do not bounce are stopped, the bodies whose points are not. `[bodies]`, or empty
+    /// If non-bouncing points are stopped: marks the bodies that are exempt. `[bodies]`, or empty
     pub stops: Option<&'a [bool]>,
     /// Lanes of the contacts that are hit, in order.
     pub found: &'a mut Vec<u32>,
@@ -34,7 +35,7 @@ pub(crate) struct Find<'a> {
 
 impl Pass for Find<'_> {
     fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        // Half a row of accelerations for each body that has some.
+        // Half a row of accelerations for each dynamic body.
         let accelerations = if opposite == OppositeKind::Dynamic { 8 } else { 4 };
         let read = 2 + accelerations + layout.points * (layout.arms() + 2);
         PerLane { halves: 0, ..PerLane::of_bodies(read, 0, opposite) }
@@ -91,7 +92,8 @@ fn find<L: Lanes>(
             continue;
         }
         let [bx, by, ..] = L::gather_quads::<1, 0>(quads, row_b);
-        // What forces add to the velocity of approach in a substep, at most along n, and at most in any direction (m/s).
+        // Approach velocity that forces add in a substep, its bound along n, and its bound in any direction
+        // (m/s).
         let size = |x: L, y: L| x.mul_add(x, y * y).sqrt();
         let positive = |x: L| x.max(-x);
         let of_b = along(bx, by);
@@ -136,10 +138,11 @@ fn find<L: Lanes>(
     }
 }
 
-/// The smallest speed that forces add to a dynamic body in a step, and an upper bound of the speed of all points (m/s); none if
-/// the bound is slower than any impact.
+/// The smallest speed that forces add to a dynamic body in a step, and an upper bound of the speed of all
+/// points (m/s); `None` if the bound is slower than any impact.
 pub(crate) fn impact_speeds(rows: &[BodyRow], increments: &[[f32; 4]], h: f32, dt: f32) -> Option<[f32; 2]> {
-    /// Farthest point of a body over its radius of gyration (1): √3 for a rod, 2.8 for the slimmest triangle.
+    /// Distance of the farthest point of a body ÷ its radius of gyration (1): √3 for a rod, 2.8 for the
+    /// slimmest triangle.
     const REACH: f32 = 3.0;
     let square = |v: &[f32; 4]| v[0].mul_add(v[0], v[1] * v[1]);
     let (mut fastest, mut least) = (0.0_f32, f32::INFINITY);
@@ -158,6 +161,7 @@ pub(crate) fn impact_speeds(rows: &[BodyRow], increments: &[[f32; 4]], h: f32, d
     let least = least.sqrt() * dt / h;
     // |v| + |ω| R ≤ √2 √(v² + ω² R²)
     let fastest = (2.0 * fastest).sqrt();
-    // Two points approach at twice that at most: what is left out here, no contact lets pass.
+    // Two points approach at most at twice that speed. No contact excluded here would pass the test in
+    // `find`.
     (2.0 * fastest > SLOW * least).then_some([least, fastest])
 }

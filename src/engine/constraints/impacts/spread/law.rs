@@ -1,4 +1,4 @@
-//! The law of one point that is hit: Newton's restitution with Coulomb's friction, and no energy from friction.
+//! The impact law of a single point: Newton's restitution with Coulomb friction, which never adds energy.
 //!
 //! # Newton and Coulomb
 //!
@@ -11,7 +11,7 @@
 //!               T = ±µ N           else, with the sign of the T that would stop it
 //! ```
 //!
-//! A disc has k_nt = 0; a corner does not, and is turned by both. Both rows are solved at once.
+//! A disc has k_nt = 0; a corner has not, and both impulses turn it. Both rows are solved together.
 //!
 //! # Friction takes energy
 //!
@@ -22,15 +22,17 @@
 //! W = ½ N (v_n⁻ + v_n⁺) + ½ T (v_t⁻ + v_t⁺),      Σ W = K⁺ − K⁻
 //! ```
 //!
-//! so a wave creates none if W ≤ 0 at each of its points. The first part is −½ N L with L = |v_n⁻| − v⁺, corrected for height.
-//! With v_n⁺ of Newton's law, W is a convex function of T, and T = 0 gains nothing. So T is bounded to W ≤ 0, between the roots of
+//! so a wave creates no energy if W ≤ 0 at each of its points. The first part is −½ N L with L = |v_n⁻| − v⁺,
+//! corrected for height. With v_n⁺ of Newton's law, W is a convex function of T, and T = 0 gains nothing. So
+//! T is bounded to W ≤ 0, between the roots of
 //!
 //! ```text
 //! d T² + (k_nn (v_t⁻ + u) + L k_nt) T − L w ≤ 0,      d = k_nn k_tt − k_nt²
 //! ```
 //!
-//! with w the v_n that the point has to gain without its impulses, and u the v_t at which it leaves with T = 0. Impulses stay within
-//! the cone, which is convex. Where Newton and Coulomb lose energy, they are not changed.
+//! with w the v_n that the point has to gain without its impulses, and u the v_t at which it leaves with T =
+//! 0. Impulses stay within the cone, which is convex. If Newton's and Coulomb's laws lose energy, their
+//! impulses are unchanged.
 
 /// Accumulated impulses along n and t (N·s) after which a point has gained `wanted` (m/s), or as much of it along t
 /// as friction lets it; see the [module](self). `k`: k_nn, k_tt, k_nt (1/kg); `old`: those so far.
@@ -43,7 +45,7 @@ pub(super) fn rough_impulses(
     if mu == 0.0 {
         return [(wanted_n / k_nn + old_n).max(0.0), 0.0];
     }
-    // Velocities that are to be made, from none of the impulses so far.
+    // Velocities to gain, starting without the impulses so far.
     let want_n = k_nn.mul_add(old_n, k_nt.mul_add(old_t, wanted_n));
     let want_t = k_nt.mul_add(old_n, k_tt.mul_add(old_t, wanted_t));
     let determinant = k_nn.mul_add(k_tt, -(k_nt * k_nt));
@@ -53,16 +55,17 @@ pub(super) fn rough_impulses(
     if stick[0] > 0.0 && stick[1].abs() <= mu * stick[0] {
         return stick;
     }
-    // Along the edge of the cone N meets k_nn ± µ k_nt; where that is not positive the
-    // edge leads nowhere (Painlevé), and N is that without friction.
+    // Along the edge of the cone the effective inverse mass of N is k_nn ± µ k_nt. If that is not positive,
+    // the edge has no solution (Painlevé), and N is the frictionless impulse.
     let slope = mu.copysign(stick[1]);
     let along = slope.mul_add(k_nt, k_nn);
     let edge_n = (want_n / if along > 0.0 { along } else { k_nn }).max(0.0);
     [edge_n, slope * edge_n]
 }
 
-/// Impulses `rough` along n and t (N·s), with less friction where they would make energy; see the [module](self). `wanted`: what
-/// is to be gained from neither impulse (m/s); `slip`: v_t⁻ (m/s); `lost`: L, if positive (m/s).
+/// Impulses `rough` along n and t (N·s), with less friction if they would add energy; see the [module](self).
+/// `wanted`: velocity to gain, starting without impulses (m/s); `slip`: v_t⁻ (m/s); `lost`: L, if positive
+/// (m/s).
 pub(super) fn lossy_impulses(
     [k_nn, k_tt, k_nt]: [f32; 3],
     rough: [f32; 2],

@@ -2,18 +2,19 @@
 //!
 //! # The law
 //!
-//! [`law`] has that of one point. An impact proceeds in *waves*. At the beginning of a wave all points that approach are found, and
-//! the velocity at which each has to leave is fixed. They are solved together by Gauss–Seidel on accumulated impulses, so a box that
-//! lands flat bounces flat. Points that approach afterwards make the next wave: an impact runs through a row of balls ball by ball.
+//! The law of a single point is in [`law`]. An impact proceeds in *waves*. A wave begins by finding all
+//! approaching points and fixing the rebound velocity of each. They are solved together by Gauss–Seidel on
+//! accumulated impulses, so a box that lands flat bounces flat. Points that approach afterwards form the next
+//! wave: an impact runs through a row of balls ball by ball.
 //!
 //! Let dv be the speed that forces give a resting body in a step. A point whose rebound would be slower than dv/10 does not bounce.
 //! It *stops* the approach, v_n⁺ ≥ 0 with an impulse only where v_n⁺ = 0, in this wave and in all later ones. So zero restitution is
 //! the limit of a small one.
 //!
-//! After a body is pushed, its other points are visited, until no approach is faster than 10⁻³ of the first. Bodies that nothing hits
-//! cost nothing. Visits of two points of a contact, one after the other, leave a share c²/(k₀ k₁) of the error, with c what an impulse at
-//! one adds to the velocity of the other. Where that is more than half, as for corners that just overlap, both normal impulses are solved
-//! at once ([`pair`]).
+//! After a body is pushed, its other points are visited, until no approach is faster than 10⁻³ of the first.
+//! Bodies that nothing hits cost nothing. Visiting the two points of a contact in turn leaves a fraction
+//! c²/(k₀ k₁) of the error, with c the velocity that a unit impulse at one adds to the other. If the fraction
+//! is more than half, as for corners that just overlap, both normal impulses are solved together ([`pair`]).
 //!
 //! # Time of the impact within the step
 //!
@@ -24,22 +25,25 @@
 //! w₁ = √(w² + 2 a s)   t = 2 s/(w₁ − w)   v⁺ = e w₁ + a t + a h/2   s⁺ = s − t (v⁺ − v)
 //! ```
 //!
-//! So a body that gets the velocity v⁺ and is moved by −t Δv flies as if it had been hit at t: in the coming step, or, for an overlap
-//! (t < 0), in the last one. Times before the last step or after the coming one are clamped, and v⁺ keeps the energy of height. A point
-//! that stops touches from t = s/|v| on. A point that is pushed again by a body that was hit at t′ takes the later of both times.
-//! Solvers that derive velocities from positions, and those of other engines, bounce at the beginning of the step: not `timed`.
+//! So a body that gets the velocity v⁺ and is moved by −t Δv flies as if it had been hit at t: in the coming
+//! step, or, for an overlap (t < 0), in the last one. Times before the last step or after the coming one are
+//! clamped, and v⁺ keeps the energy of height. A point that stops touches from t = s/|v| on. A point that is
+//! pushed again by a body that was hit at t′ uses the later time. Solvers that derive velocities from
+//! positions, and those of other engines, bounce at the beginning of the step (`timed` is false).
 //!
-//! At the time of the impulse the centers have moved against each other by D. With the arms of the step's beginning the impulse would
-//! add D × λ to the angular momentum. So both arms end at one point at that time, r_a + D/2 and r_b − D/2, and round shapes have
-//! the frame of that time (`touch.rs`). The rows themselves contain this: an impulse with an effect that its row does not know may add
-//! energy, and has shot bodies out of piles.
+//! At the time of the impulse the centers have moved relative to each other by D. With the arms of the start
+//! of the step the impulse would add D × λ to the angular momentum. So both arms end at one point at that
+//! time, r_a + D/2 and r_b − D/2, and round shapes have the frame of that time (`touch.rs`). The rows
+//! themselves use these arms and frames: an impulse with an effect that its row leaves out may add energy,
+//! and has shot bodies out of piles.
 //!
 //! # A bound for each island
 //!
-//! Bodies connected by contacts are an island. Islands are solved independently, so a scene behaves the same beside another one. An
-//! island has at most 32 waves, of which the last 4 only stop, and a number of visits that grows with its points ([`VISITS`]). The
-//! solver stops what still approaches then. Bodies of such an island that would end deeper in another one than they began are not moved.
-//! So the time of a step has a bound: `simpulse torture --pace 3` measures how many times the median it is.
+//! Bodies connected by contacts form an island. Islands are solved independently, so a scene behaves the same
+//! next to another one. An island has at most 32 waves, of which the last 4 only stop, and a visit limit that
+//! grows with its number of points ([`VISITS`]). The solver stops points that still approach after that.
+//! Bodies of such an island that would end deeper in another body than they began are not moved. So the time
+//! of a step is bounded: `simpulse torture --pace 3` measures it as a multiple of the median.
 
 mod find;
 mod law;
@@ -57,35 +61,36 @@ use std::collections::VecDeque;
 /// No lane, no point.
 const NONE: u32 = u32::MAX;
 
-/// Impacts spread until no approach is faster than this share of the fastest (1).
+/// Impacts spread until no approach is faster than this fraction of the fastest (1).
 const TOLERANCE: f32 = 1e-3;
 
-/// Factor on it where something bounces (1): the spin that an error gives to a flat box grows with each bounce.
+/// Factor on [`TOLERANCE`] if a point bounces (1): the spin that an error gives to a flat box grows with each
+/// bounce.
 const FINER: f32 = 1e-3;
 
-/// How far a point is followed, as a multiple of its way in the step (1).
+/// How far ahead the motion of a point is followed, as a multiple of its path in the step (1).
 const AHEAD: f32 = 1.1;
 
 /// Slowest rebound, as a multiple of the speed that forces give a resting body in a step (1).
 const BOUNCES: f32 = 0.1;
 
-/// Greatest number of waves of an island, and how many of the last ones only stop.
+/// Most waves of an island, and the number of last waves that only stop.
 const WAVES: [u32; 2] = [32, 4];
 
-/// Greatest number of visits of an island: so many for each of its first points. Each of the others adds one.
+/// Visit limit of an island, per point for its [`FIRST`] points. Each further point adds one.
 pub(crate) const VISITS: usize = 18;
 
-/// How many points are first.
+/// Number of points to which [`VISITS`] applies.
 const FIRST: usize = 8;
 
-/// How much deeper a point of an island that reached its bound may end, as a share of the slop (1): bodies that touch
-/// end in each other by what is left of their approach.
+/// How much deeper a point of an island that reached its bound may end, as a fraction of the slop (1): the
+/// residual approach of touching bodies makes them overlap.
 const DEEPER: f32 = 0.1;
 
 /// Solves impacts; keeps its memory from step to step.
 #[derive(Clone, Debug, Default)]
 pub struct Spread {
-    /// Lanes that are hit, of the colored batches and of the serial ones, then of both by island.
+    /// Lanes that are hit, of the colored batches and of the serial ones. `hit` has those of both, by island.
     found: [Vec<u32>; 2],
     hit: Vec<(u32, u32)>,
     /// `[rows]`
@@ -95,19 +100,19 @@ pub struct Spread {
     /// The next end of the same body. Lane l, counted through both sets of batches, has the ends 2 l and 2 l + 1.
     /// `[2 lanes]`
     next: Vec<u32>,
-    /// Place of the first of the two points of a lane in `points`, or none. `[lanes]`
+    /// Index in `points` of the first of the two points of a lane, or [`NONE`]. `[lanes]`
     listed: Vec<u32>,
-    /// In pairs; a point that is not there has no mass.
+    /// Points, in pairs. A missing point has zero mass.
     points: Vec<HitPoint>,
-    /// Bodies that were pushed since their points were looked at.
+    /// Bodies that were pushed since their points were last visited.
     queue: VecDeque<u32>,
     /// Bodies of the island that were pushed.
     pushed: Vec<u32>,
     /// The first point of the island.
     first: usize,
-    /// How often its points were solved.
+    /// Number of visits to points of the island.
     visits: usize,
-    /// Slower approaches count as solved (m/s).
+    /// Approach speed below which a point counts as solved (m/s).
     slowest: f32,
 }
 
@@ -129,8 +134,8 @@ impl Spread {
         &mut self.found
     }
 
-    /// Solves the impacts of the lanes that were found, island by island. Returns how many visits that
-    /// took and how many islands reached their bound; none without impacts.
+    /// Solves the impacts of the lanes that were found, island by island. Returns the number of visits and of
+    /// islands that reached their bound; `None` if no impacts occurred.
     pub(crate) fn run(&mut self, on: &mut SpreadInput<'_>) -> Option<[usize; 2]> {
         if self.found.iter().all(Vec::is_empty) {
             return None;
@@ -168,7 +173,7 @@ impl Spread {
         Some([visits, cut])
     }
 
-    /// Solves the impacts of an island; false if it reached its bound.
+    /// Solves the impacts of an island. Returns false if it reached its bound.
     fn island(&mut self, on: &mut SpreadInput<'_>, hit: std::ops::Range<usize>) -> bool {
         (self.first, self.visits) = (self.points.len(), 0);
         self.pushed.clear();
@@ -212,7 +217,7 @@ impl Spread {
         is_done
     }
 
-    /// Bodies stay where they are if one of their points would end deeper, visited or not.
+    /// Cancels the displacement of bodies that have a point, visited or not, that would end deeper.
     fn stay(&mut self, on: &mut SpreadInput<'_>) {
         let deeper = DEEPER * on.slop;
         for i in 0..self.pushed.len() {
@@ -233,7 +238,7 @@ impl Spread {
         }
     }
 
-    /// Finds the points that bounce in this wave; whether there are any.
+    /// Finds the points that bounce in this wave. Returns whether there are any.
     fn begin_wave(&mut self, on: &mut SpreadInput<'_>, is_first: bool, bounces: bool) -> bool {
         let mut any = false;
         for place in self.first..self.points.len() {
@@ -257,7 +262,8 @@ impl Spread {
                     let mut turned = *point;
                     turned.turn(&frame, on.rows);
                     on.fall(&mut turned);
-                    // A point that would pass by then is stopped by its row of the beginning in any case, so it bounces on that.
+                    // If the turned point does not bounce, the row of the start would still stop it, so it
+                    // bounces on that row.
                     if let Some(then) = rebounds(&turned, on, is_first) {
                         turned.round = None;
                         on.turn(&turned, &frame);
@@ -274,7 +280,7 @@ impl Spread {
         any
     }
 
-    /// Applies the loads that points carried until the impact released them; whether there are any.
+    /// Applies the loads that points carried until the impact released them. Returns whether there are any.
     ///
     /// A block that rocks stands on one corner until the other one is hit. Its load F of the step before belongs to the first
     /// corner until t, and in the step that is solved from its beginning on, all of it goes to the second: an error of F t
@@ -309,7 +315,7 @@ impl Spread {
         any
     }
 
-    /// Keeps what a wave has given.
+    /// Adds the impulses of the wave to those of earlier waves.
     fn end_wave(&mut self) {
         for point in &mut self.points[self.first..] {
             for k in 0..2 {
@@ -318,7 +324,8 @@ impl Spread {
         }
     }
 
-    /// Visits the points of bodies that were pushed, until none is left or the bound is reached; whether none is left.
+    /// Visits the points of pushed bodies until none is left or the bound is reached. Returns whether none is
+    /// left.
     fn spread(&mut self, on: &mut SpreadInput<'_>, bounces: bool) -> bool {
         let mut is_done = true;
         while let Some(body) = self.queue.pop_front() {
@@ -341,8 +348,8 @@ impl Spread {
         is_done
     }
 
-    /// Solves the normal impulses of both points of a contact at once, if both bear one and visits of one after the other would hardly
-    /// get ahead.
+    /// Solves both normal impulses of a contact together, if both are positive and alternating visits would
+    /// converge slowly.
     fn visit_both(&mut self, on: &mut SpreadInput<'_>, first: usize) {
         let pushes = |p: &HitPoint| p.impulse[0] > 0.0 && matches!(p.role, Role::Stops | Role::Bounces);
         if !self.points[first].is_tight || !self.points[first..first + 2].iter().all(pushes) {
@@ -365,7 +372,7 @@ impl Spread {
         }
     }
 
-    /// Puts a point between where its bodies are at the time of its impact.
+    /// Moves a point to the middle between the positions of its bodies at the time of its impact.
     fn meet(&mut self, on: &SpreadInput<'_>, place: usize) {
         if on.timed {
             let point = &mut self.points[place];
@@ -429,8 +436,8 @@ impl Spread {
         self.push(on, place, delta, [time; 2]);
     }
 
-    /// Pushes both bodies of a point with an impulse (N·s) up to `time` (s), in the mean at `at` (s), and has their points
-    /// looked at.
+    /// Applies an impulse (N·s) to both bodies of a point and queues them. The impulse acts until `time` (s),
+    /// and at `at` (s) on average.
     fn push(&mut self, on: &mut SpreadInput<'_>, place: usize, impulse: [f32; 2], [at, time]: [f32; 2]) {
         let point = &self.points[place];
         for (row, is_pushed) in point.rows.into_iter().zip([point.pushes_a, true]) {
@@ -449,7 +456,7 @@ impl Spread {
         point.push(on.rows, &mut self.bodies, impulse, if on.timed { at } else { 0.0 });
     }
 
-    /// Links the ends of each body, and bodies that contacts connect.
+    /// Links the ends of each body, and joins bodies in contact into islands.
     fn link(&mut self, on: &SpreadInput<'_>) {
         let (count, lanes) = (on.rows.len(), on.batches[0].lanes() + on.batches[1].lanes());
         self.bodies.clear();
@@ -478,7 +485,7 @@ impl Spread {
         }
     }
 
-    /// The body that stands for the island of a lane.
+    /// The body that represents the island of a lane.
     fn island_of(&mut self, on: &SpreadInput<'_>, lane: u32) -> u32 {
         let (lane, lanes) = (lane as usize, on.batches[0].lanes());
         let (part, of) = if lane < lanes { (0, lane) } else { (1, lane - lanes) };
@@ -486,7 +493,7 @@ impl Spread {
         self.islands.least(on.batches[part].row_b()[of])
     }
 
-    /// The place of the first point of a lane.
+    /// Index of the first point of a lane. Adds the points of the lane to the list if they are not in it.
     fn list(&mut self, on: &SpreadInput<'_>, lane: u32) -> usize {
         let listed = &mut self.listed[lane as usize];
         if *listed == NONE {
@@ -501,7 +508,7 @@ impl Spread {
     }
 }
 
-/// When a point that comes in faster than `slowest` (m/s) closes its gap (s), if it does so within the step.
+/// Time (s) at which a point that approaches faster than `slowest` (m/s) closes its gap, if within the step.
 fn arrival(point: &HitPoint, on: &SpreadInput<'_>, slowest: f32) -> Option<f32> {
     let [vn, _] = point.velocity(on.rows);
     if vn >= -slowest {
@@ -511,20 +518,20 @@ fn arrival(point: &HitPoint, on: &SpreadInput<'_>, slowest: f32) -> Option<f32> 
     (vn.mul_add(AHEAD * on.dt, gap) < 0.0).then(|| gap / -vn)
 }
 
-/// Whether it approaches fast enough to bounce.
+/// Whether a point approaches fast enough to bounce.
 fn will_bounce(point: &HitPoint, on: &SpreadInput<'_>) -> bool {
     let speed = -point.velocity(on.rows)[0];
     point.restitution > 0.0 && speed > point.slow && point.restitution * speed > BOUNCES * point.slow
 }
 
-/// Velocity at which an approaching point has to leave (m/s), and the time of its impact (s); see the [module](self).
+/// Rebound velocity of an approaching point (m/s), and the time of its impact (s); see the [module](self).
 fn rebounds(point: &HitPoint, on: &SpreadInput<'_>, is_first: bool) -> Option<[f32; 2]> {
     if !will_bounce(point, on) {
         return None;
     }
     let (v, s, a, e) = (point.velocity(on.rows)[0], point.gap(on.rows), point.falls, point.restitution);
     let (dt, h) = (on.dt, on.h);
-    // Its gap at the end of the step and after it.
+    // Its gap slightly after the end of the step.
     if (v - a * 0.5 * (dt + h)).mul_add(AHEAD * dt, s) >= 0.0 {
         return None;
     }
@@ -532,7 +539,7 @@ fn rebounds(point: &HitPoint, on: &SpreadInput<'_>, is_first: bool) -> Option<[f
         let w = v - 0.5 * a * h;
         let square = w.mul_add(w, 2.0 * a * s);
         let touch = 2.0 * s / (square.max(0.0).sqrt() - w);
-        // A deeper point was so before, or is hit because another one was.
+        // A deeper point overlapped before, or is hit because another one was.
         let earliest = if is_first { -dt } else { 0.0 };
         let time = if square > 0.0 && touch > earliest { touch.min(dt) } else { 0.0 };
         if time != 0.0 {

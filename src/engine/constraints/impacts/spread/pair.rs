@@ -1,14 +1,15 @@
 //! Both normal impulses of a contact.
 
-/// Normal impulses N ≥ 0 (N·s) of two points that gain what they want, or more where there is none; `k`: what each adds to its own
-/// normal velocity (1/kg), `coupling`: to that of the other; `old`: impulses so far; `wanted`: what is left to gain (m/s).
+/// Normal impulses N ≥ 0 (N·s) with which two points gain `wanted`, or more if a point has no impulse. `k`:
+/// velocity that a unit impulse adds to its own point (1/kg); `coupling`: to the other point; `old`: impulses
+/// so far; `wanted`: normal velocity still to gain (m/s).
 ///
 /// ```text
 /// k₀ N₀ + c N₁ = b₀,   c N₀ + k₁ N₁ = b₁,   b = wanted + what the old ones have given
 /// ```
 ///
-/// If both solutions are positive they are the answer; if one is negative, that point leaves and the other has its own row. None where
-/// neither holds, or where both points are one.
+/// If neither impulse is negative, they are the solution. If one is negative, that point leaves and the other
+/// is solved by its own row. `None` if neither case applies, or if both points coincide.
 pub(super) fn impulses(k: [f32; 2], coupling: f32, old: [f32; 2], wanted: [f32; 2]) -> Option<[f32; 2]> {
     let determinant = k[0].mul_add(k[1], -(coupling * coupling));
     if determinant <= 0.0 {

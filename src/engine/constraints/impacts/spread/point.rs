@@ -18,7 +18,7 @@ pub(super) struct Body {
     /// Time of the last push (s); −∞ without one.
     pub time: f32,
     pub is_queued: bool,
-    /// Rounding error of its velocity, added with the next push (m/s, m/s, rad/s): there may be very many.
+    /// Rounding error of its velocity, added with the next push (m/s, m/s, rad/s): pushes can be very many.
     pub rounded: [f32; 3],
 }
 
@@ -56,7 +56,7 @@ pub(super) struct HitPoint {
     pub own_arms: [[f32; 2]; 2],
     /// k_nn, k_tt, k_nt (1/kg).
     pub k: [f32; 3],
-    /// The normal mass of its record (kg); zero for a point that is not there.
+    /// The normal mass of its record (kg); zero for a missing point.
     pub mass: f32,
     pub friction: f32,
     /// Coefficient of restitution (1).
@@ -64,7 +64,7 @@ pub(super) struct HitPoint {
     pub role: Role,
     /// Target of v_n in this wave (m/s).
     pub target: f32,
-    /// v_t before the wave, and what of |v_n| it shall lose (m/s).
+    /// v_t before the wave, and the part of |v_n| to lose (m/s).
     pub slip: f32,
     pub lost: f32,
     /// Acceleration of approach, and the relative speed that forces give in a step (m/s², m/s).
@@ -78,15 +78,15 @@ pub(super) struct HitPoint {
     pub given: [f32; 2],
     /// Impulses of the last substep, along both (N·s).
     pub borne: [f32; 2],
-    /// When it is hit (s).
+    /// Time of its impact (s).
     pub time: f32,
-    /// From a to b, as far as they have moved against each other when arms end at one point (m).
+    /// Displacement of b relative to a for which the arms end at one point (m).
     pub apart: [f32; 2],
     /// Its round shapes, until it is hit.
     pub round: Option<Round>,
     /// Whether a shape is round.
     pub is_round: bool,
-    /// Of the first point: whether it shares most of its effect with the second.
+    /// On the first point: whether its coupling with the second is strong.
     pub is_tight: bool,
 }
 
@@ -104,11 +104,11 @@ pub(crate) struct SpreadInput<'a> {
     pub h: f32,
     /// Overlap that is left alone (m).
     pub slop: f32,
-    /// Bodies are where they were hit, else where they are.
+    /// Impacts happen at their time in the step, else at its beginning.
     pub timed: bool,
-    /// Bodies with joints, which stay where they are. `[bodies]`, or empty
+    /// Bodies with joints, which impacts do not move. `[bodies]`, or empty
     pub joined: &'a [bool],
-    /// Points that an impact releases have borne their body until then.
+    /// Points that an impact releases bear their load until its time.
     pub releases: bool,
     /// Most visits for each of the first points of an island.
     pub visits: usize,
@@ -117,7 +117,7 @@ pub(crate) struct SpreadInput<'a> {
     pub bounces: bool,
 }
 
-/// Where the record of a lane is.
+/// Location of the record of a lane.
 pub(super) struct LanePlace {
     /// Which batches.
     pub part: usize,
@@ -150,7 +150,7 @@ impl SpreadInput<'_> {
         }
     }
 
-    /// A point has the frame of the moment of touch.
+    /// Writes the frame of the time of touch to the record of a point.
     pub(super) fn turn(&mut self, point: &HitPoint, frame: &TouchFrame) {
         let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
         let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
@@ -158,7 +158,7 @@ impl SpreadInput<'_> {
         frame.write_record(&layout, rows, |vector, value| floats[first + vector * width] = value);
     }
 
-    /// What is left of the step is solved with the arms of the impact.
+    /// Writes the arms of the impact to the record, for the rest of the step.
     pub(super) fn put(&mut self, point: &HitPoint) {
         let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
         let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
@@ -166,7 +166,7 @@ impl SpreadInput<'_> {
         write_arms(&layout, point.index as usize, point.arms, [1.0 / point.k[0], 1.0 / point.k[1]], put);
     }
 
-    /// A point that has bounced leaves by itself: it is not pushed out as well.
+    /// Removes the overlap of a point that has bounced from its record: it separates without a push.
     pub(super) fn leave(&mut self, point: &HitPoint) {
         let raised = point.gap(self.rows).min(0.0);
         let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
@@ -246,7 +246,7 @@ impl HitPoint {
         std::array::from_fn(|i| b[2].mul_add(of_b[i], a[2].neg_mul_add(of_a[i], along[i])))
     }
 
-    /// What a normal impulse at another point of its contact adds to its normal velocity (1/kg).
+    /// Normal velocity that a unit normal impulse at another point of the contact adds (1/kg).
     pub fn coupling(&self, other: &HitPoint, rows: &[BodyRow]) -> f32 {
         let straight = self.normal[0].mul_add(other.normal[0], self.normal[1] * other.normal[1]);
         let of = |body: usize| {
@@ -256,7 +256,7 @@ impl HitPoint {
         of(1) + if self.pushes_a { of(0) } else { 0.0 }
     }
 
-    /// Gap as bodies are now (m).
+    /// Gap at the current positions (m).
     pub fn gap(&self, rows: &[BodyRow]) -> f32 {
         let ([a, b], [nx, ny]) = (self.rows.map(|row| rows[row as usize].delta), self.normal);
         let moved = nx.mul_add(b[0] - a[0], ny * (b[1] - a[1]));
@@ -267,7 +267,7 @@ impl HitPoint {
         self.separation + moved + turned(b[2], self.arms[1]) - turned(a[2], self.arms[0])
     }
 
-    /// Impulses `[n, t]` (N·s) on both bodies, at `time` (s).
+    /// Applies impulses `[n, t]` (N·s) to both bodies, at `time` (s).
     pub fn push(&self, rows: &mut [BodyRow], bodies: &mut [Body], [n, t]: [f32; 2], time: f32) {
         let [nx, ny] = self.normal;
         let (x, y) = (nx.mul_add(n, ny * t), ny.mul_add(n, -(nx * t)));
@@ -285,7 +285,7 @@ impl HitPoint {
         }
     }
 
-    /// Has the frame of the moment of touch from now on.
+    /// Switches to the frame of the time of touch.
     pub(super) fn turn(&mut self, frame: &TouchFrame, rows: &[BodyRow]) {
         let k = couplings(self.rows.map(|row| &rows[row as usize]), frame.arms);
         (self.normal, self.arms, self.own_arms) = (frame.normal.to_array(), frame.arms, frame.arms);
@@ -295,7 +295,8 @@ impl HitPoint {
         self.apart = [apart(0), apart(1)];
     }
 
-    /// Puts its place between where both bodies are at its time; see the [module](self).
+    /// Moves the point to the middle between the positions of both bodies at its time; see the
+    /// [module](super).
     pub fn meet(&mut self, rows: &[BodyRow]) {
         // Nothing turns a smooth disc.
         if !self.pushes_a || self.friction == 0.0 && self.is_round {

@@ -1,14 +1,17 @@
 //! Finds closed points, and applies their loads of the last step to the accelerations of bodies.
 //!
-//! A point is closed if its gap is a fraction of the slop, it moves along its normal no faster than what forces make of
-//! rest in a step, v ≤ dt (|a_a| + |a_b|), and it is still closed in the middle of the step: a load acts until its end, and one that acts
-//! on what has left works on it. One that closes begins with the impulse of the last substep, which its load replaces. So a point that
-//! sags counts as closed as long as it overlaps: if its spring lost its impulse whenever a heavy body rocks on it, the body would rock on.
+//! A point is closed if three conditions hold. Its gap is below a fraction of the slop. Its normal speed is
+//! at most the speed that forces give resting bodies in a step, v ≤ dt (|a_a| + |a_b|). And it is still
+//! closed in the middle of the step: a load acts until the end of the step, and does work on bodies that have
+//! separated. The load of a newly closed point starts from the impulse of the last substep, which it
+//! replaces. So a sagging point counts as closed as long as it overlaps. If its spring lost its impulse
+//! whenever a heavy body rocks on it, the rocking would not stop.
 //!
-//! A contact is calm if its points have been slower than 1 mm/s for 0.3 s, longer than what rocks stands still in between. If its springs
-//! are also shortened for nearly all of its load, they follow it at once from then on ([`super::shorten`]).
+//! A contact is calm if its points have been slower than 1 mm/s for 0.3 s, which is longer than a rocking
+//! body pauses between swings. If its springs are also shortened for nearly all of its load, they follow the
+//! load at once from then on ([`super::shorten`]).
 //!
-//! What is left of impulses, after the part that springs are shortened for, is what statics does not know.
+//! The part of the impulses for which springs are not shortened is the part that statics does not explain.
 
 use super::{JOINED, OPEN};
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
@@ -20,13 +23,14 @@ use crate::engine::params::LINEAR_SLOP;
 /// Greatest gap of a closed point (m).
 const CLOSED: f32 = 0.02 * LINEAR_SLOP;
 
-/// What is slower is calm (m/s): a twentieth of the gap of a closed point in the time in which loads rise.
+/// Speed below which a point is calm (m/s): a twentieth of the gap of a closed point in the time in which
+/// loads rise.
 const CALM_SPEED: f32 = 1e-3;
 
-/// For so long (s).
+/// Time after which a slow contact is calm (s).
 pub(super) const CALM_TIME: f32 = 0.3;
 
-/// Part of a load from which on the springs of a calm contact follow it at once (1).
+/// Fraction of its load at which the springs of a calm contact start to follow the load at once (1).
 const NEARLY: f32 = 0.99;
 
 /// Finds closed points, and starts from their loads.
@@ -110,7 +114,7 @@ fn close<L: Lanes>(
             loads[2 * p] = is_closed.select_positive(normal, open);
             loads[2 * p + 1] = is_closed.select_positive(tangent, zero);
             let impulse = [loads[2 * p].max(zero) * h, loads[2 * p + 1] * h];
-            // What is left of impulses is what statics does not know.
+            // The rest of the impulses is what statics does not explain.
             let borne = if p == 0 { borne_0 } else { borne_1 };
             let part = last[2 * p].select_positive(borne.max(zero) / last[2 * p], one);
             let lacks =
@@ -159,7 +163,7 @@ pub(super) fn push<L: Lanes>([a, b]: [&mut [L; 8]; 2], [nx, ny]: [L; 2], arms: [
     a[2] = a[7].neg_mul_add(turn(arms[0]), a[2]);
 }
 
-/// Writes four numbers kept of the contacts in the `filled` lanes of a batch, those of their quad `O`.
+/// Writes quad `O` of the kept numbers of the contacts in the `filled` lanes of a batch.
 #[inline(always)]
 pub(super) fn store<L: Lanes, const O: usize>(
     quads: &mut [Quad],

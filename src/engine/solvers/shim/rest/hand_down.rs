@@ -20,7 +20,8 @@ use glam::{DVec2, Vec2};
 /// Smallest cosine between gravity and the normals of contacts that hand loads down.
 const BEARING: f32 = 0.5;
 
-/// Acceleration that is ignored, over that of free flight (1): the lean of a column grows unless loads fit its position.
+/// Acceleration that is ignored, as a fraction of that of free flight (1): the lean of a column grows unless
+/// loads fit its position.
 const STILL: f32 = 1e-5;
 
 /// Smallest cosine between the normals of a body that does not lean (1).
@@ -32,19 +33,19 @@ pub(in super::super) struct HandDown {
     upright: Graph,
     /// Contacts of `upright`.
     bearing: Vec<u32>,
-    /// Of all contacts; empty if `upright` has all bodies that have some.
+    /// Graph of all contacts; empty if `upright` supports all bodies with contacts.
     all: Graph,
     /// Bodies from the top downward.
     downwards: Vec<u32>,
-    /// Of one body.
+    /// Supports of the current body.
     supports: Vec<Support>,
 }
 
-/// What loads are handed down on.
+/// The data that [`HandDown::run`] works on.
 pub(in super::super) struct HandDownInput<'a> {
     /// All contacts.
     pub contacts: &'a [Contact],
-    /// N and T of both points of each contact (N), N negative where it is open. `[contacts × PER_CONTACT]`
+    /// N and T of both points of each contact (N), N negative if it is open. `[contacts × PER_CONTACT]`
     pub kept: &'a mut [f32],
     /// Changes of velocity per substep under the loads. `[rows]`
     pub fields: &'a mut [BodyRow],
@@ -90,7 +91,7 @@ impl HandDown {
         self.downwards.extend(self.upright.upwards().iter().rev());
     }
 
-    /// Hands down what accelerates bodies.
+    /// Supports accelerating bodies by loads on the bodies below, from top to bottom.
     pub fn run(&mut self, on: &mut HandDownInput<'_>) {
         for i in 0..self.downwards.len() {
             let body = self.downwards[i];
@@ -103,7 +104,7 @@ impl HandDown {
             if moves <= free * (STILL * STILL) {
                 continue;
             }
-            // What nothing bears accelerates as in free flight.
+            // A body without support accelerates as in free flight.
             let leans = self.leans(on.contacts, body);
             if leans && moves <= 0.25 * free {
                 continue;
@@ -215,7 +216,7 @@ impl HandDown {
     }
 }
 
-/// Against gravity; y without it.
+/// Unit vector against gravity; y without gravity.
 fn up(gravity: Vec2) -> Vec2 {
     (-gravity).try_normalize().unwrap_or(Vec2::Y)
 }

@@ -26,8 +26,8 @@
 //! impulses of the springs that they shorten. So there is no feedback loop that must be tuned, delays loads or rocks
 //! a column.
 //!
-//! Joints bear what statics does not know. So contacts of bodies with joints count as open: they have no load, and their springs
-//! sag.
+//! Statics ignores the loads that joints bear. So contacts of bodies with joints count as open: they have no
+//! load, and their springs sag.
 //!
 //! # New bodies
 //!
@@ -55,7 +55,7 @@ pub(super) const CALM: usize = 4;
 /// See [`PER_CONTACT`].
 pub(super) const BORNE: usize = 6;
 
-/// Place in the fields of bodies that is 1 for a body with a joint.
+/// Index in the fields of a body of the value that is 1 if it has a joint.
 const JOINED: usize = 4;
 
 /// N of a point that is open.

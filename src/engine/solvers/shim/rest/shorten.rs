@@ -2,28 +2,32 @@
 //!
 //! # Loads that rise
 //!
-//! A spring that bears F and is shortened by another dδ does the work F dδ. Over a cycle of what rocks or sways that is
+//! A spring that bears F does the work F dδ when it is shortened by a further dδ. Over a cycle of rocking or
+//! swaying that is
 //!
 //! ```text
 //! ∮ F dδ > 0   if δ follows F late,        0   if δ stays or is a function of F
 //! ```
 //!
-//! so shortening a spring while its body moves drives the motion, and where δ stays, what the spring gives way is lost to its damper. The
-//! load that a spring is shortened for follows its load at once downwards, which does no work that the load has not done. Upwards it follows
-//! where the contact is calm alone ([`super::closed`]), within τ = 3 s, a few periods of a column that sways:
+//! so shortening a spring while its body moves drives the motion. If δ stays, the deflection is lost to the
+//! damper.
+//!
+//! Let the preload F be the load for which a spring is shortened, and N its load. The preload follows a
+//! falling load at once, which does no work that the load has not done. It follows a rising load only if the
+//! contact is calm ([`super::closed`]), within τ = 3 s, a few periods of a swaying column:
 //!
 //! ```text
 //! F ← min(N, F + (N − F) dt/(τ + dt))
 //! ```
 //!
-//! Calm contacts that bear nearly all of it follow at once, so that columns that lean get the moment that they need; and so do
-//! those that are found in the first step of one of their bodies.
+//! Calm contacts whose preload is nearly their whole load follow at once, so leaning columns get the moment
+//! that they need. So do contacts found in the first step of one of their bodies.
 //!
 //! # Contacts that roll
 //!
-//! What shortens a spring moves bodies apart, and on one point they roll: in a pile of discs some contact slips, loads change, and the pile
-//! swells and settles without an end. So a contact of one point keeps the load that it was shortened for while that is at least half of what it
-//! bears, and no more than that and a tenth.
+//! Shortening a spring moves bodies apart, and bodies that touch at one point then roll. In a pile of discs
+//! some contact slips, loads change, and the pile swells and settles forever. So a contact of one point keeps
+//! its preload while that is between half and 1.1 times its load.
 
 use super::closed::CALM_TIME;
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
@@ -41,19 +45,19 @@ pub(in super::super) struct Shorten {
     pub h: f32,
     /// Step (s).
     pub dt: f32,
-    /// Loads rise slowly, and only where nothing moves.
+    /// Preloads rise slowly, and only at calm contacts.
     pub rises: bool,
-    /// Contacts of one point keep what they were shortened by.
+    /// Contacts of one point keep their preload within bounds.
     pub holds: bool,
 }
 
-/// Least and most that a contact of one point keeps of its load (1).
+/// Smallest preload that a contact of one point keeps, as a fraction of its load (1).
 const LEAST: f32 = 0.5;
 
-/// See [`LEAST`].
+/// Largest such preload, as a multiple of the load (1); see [`LEAST`].
 const MOST: f32 = 1.1;
 
-/// τ: time in which loads rise on what is calm (s).
+/// τ: time constant of rising preloads at calm contacts (s).
 const RISE: f32 = 3.0;
 
 /// Prefetch distance of contacts (batches).
@@ -125,7 +129,7 @@ fn shorten<L: Lanes>(
             }
             let sag = compliance * borne[p] / mass;
             let at = layout.at(p, layout.normal_impulse);
-            // What rises is in the impulse already: the spring gave way for it.
+            // A rise is already in the impulse: the spring has deflected under it.
             let known = (before + L::splat(0.5)).select_positive(borne[p].min(before), borne[p]);
             record[at] = known.mul_add(h_lanes, record[at]).max(zero);
             let at = layout.at(p, layout.separation);
