@@ -44,10 +44,11 @@
 //!
 //! # Crushed bodies
 //!
-//! A body that a heavy one presses against a floor overlaps both. If two opposing overlaps together are more than ρ, there is no room
-//! left for it. As soon as a normal turns, or the body rolls over a corner, the impulses that press it, up to 10⁵ times its own
-//! weight, no longer cancel: a box of 0.05 kg left a stack of 320 kg at 104 m/s. Its speed has the same bound, where V is the
-//! fastest surface that touches it. Its contacts keep their impulses, since the heavy body would sink without them.
+//! A body that a heavy one presses against a floor, or against another heavy one, overlaps both. If two
+//! opposing overlaps with bodies of at least ten times its mass together exceed ρ, there is no room left for it. As soon as a normal turns, or the body rolls over a corner, the impulses that
+//! press it no longer cancel. They can be 2·10⁴ times its weight: a box of 0.05 kg under one of 320 kg left at
+//! 104 m/s. Its speed has the same bound, where V is the fastest surface that touches it. Its contacts keep
+//! their impulses, since the heavy body would sink without them.
 
 use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::constraints::Passes;
@@ -60,6 +61,9 @@ use crate::engine::narrowphase::Margins;
 
 /// Normals with a smaller product oppose each other (1).
 const OPPOSED: f32 = -0.5;
+
+/// Bodies of this many times the mass of another one crush it (1).
+const HEAVY: f32 = 10.0;
 
 /// A deep contact: the bodies by which it is grouped, its index, and whether the normal keeps its sign.
 type DeepContact = ([u32; 2], u32, bool);
@@ -101,7 +105,7 @@ impl Jams {
         if !self.deep.is_empty() {
             self.hold(types, bodies);
         }
-        self.squeeze(&bodies.kind);
+        self.squeeze(bodies);
         self.deep.sort_unstable();
         for group in self.deep.chunk_by(|p, q| p.0 == q.0).filter(|group| group.len() > 1) {
             let [body, same] = group[0].0;
@@ -195,13 +199,13 @@ impl Jams {
     }
 
     /// Finds the squeezes, and lists deep contacts once more, by body.
-    fn squeeze(&mut self, kinds: &[BodyKind]) {
+    fn squeeze(&mut self, bodies: &Bodies) {
         if self.deep.is_empty() {
             return;
         }
-        let is_dynamic = |body: u32| kinds[body as usize] == BodyKind::Dynamic;
+        let is_dynamic = |body: u32| bodies.is_dynamic(body as usize);
         self.squeezed.clear();
-        self.squeezed.resize(kinds.len(), -1.0);
+        self.squeezed.resize(bodies.len(), -1.0);
         for &(body, speed) in self.pressed.iter().filter(|p| is_dynamic(p.0)) {
             let most = &mut self.squeezed[body as usize];
             *most = most.max(speed);
@@ -220,8 +224,9 @@ impl Jams {
         }
         for k in 0..self.deep.len() {
             let ([a, b], i, _) = self.deep[k];
-            for (own, is_own) in [(a, false), (b, true)] {
-                if is_dynamic(own) {
+            for (own, other, is_own) in [(a, b, false), (b, a, true)] {
+                let is_crushed = HEAVY * bodies.inv_mass[other as usize] <= bodies.inv_mass[own as usize];
+                if self.squeezed[own as usize] >= 0.0 || is_dynamic(own) && is_crushed {
                     self.deep.push(([own; 2], i, is_own));
                 }
             }
