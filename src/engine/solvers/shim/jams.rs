@@ -71,6 +71,7 @@ type DeepContact = ([u32; 2], u32, bool);
 /// Finds jams; reuses its memory from step to step.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Jams {
+    /// Deep contacts, by pair of bodies, and once more by each body that may be jammed between others.
     deep: Vec<DeepContact>,
     /// Bodies that touch a kinematic one, and how fast its surface is there (m/s).
     pressed: Vec<(u32, f32)>,
@@ -112,6 +113,7 @@ impl Jams {
             if body != same && bodies.is_dynamic(body as usize) && bodies.is_dynamic(same as usize) {
                 continue;
             }
+            // In a squeeze any opposing overlaps jam a body; elsewhere only those that crush it.
             let room = if body == same && self.squeezed[body as usize] < 0.0 {
                 square_gyration(bodies, body).sqrt()
             } else {
