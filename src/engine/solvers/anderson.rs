@@ -1,4 +1,5 @@
-//! Anderson acceleration of Gauss–Seidel: the next iterate is the combination of the last few sweeps with the smallest change.
+//! Anderson acceleration of Gauss–Seidel: the next iterate is the combination of the last few sweeps with the
+//! smallest change.
 //!
 //! **Source.** `walker2011`, section 2; the sweeps are those of [`super::pgs`].
 //!

@@ -71,9 +71,7 @@ impl Solver for TwoLevel {
                     passes.with_system(Phase::Solve, |system| conjugate.go_on(system));
                 }
             }
-            let (vectors, masses) = conjugate.vectors();
-            passes.give_back(masses);
-            passes.give_back(vectors);
+            passes.give_back(conjugate.vectors());
             passes.integrate_positions();
             passes.end_substep(substep);
         }

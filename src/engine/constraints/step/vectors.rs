@@ -48,8 +48,9 @@ impl Passes<'_> {
         }
     }
 
-    /// Effective masses of all rows (kg, kg·m²), for [`energy`](crate::engine::constraints::records::point_vector::energy); `None` in a
-    /// scene without joints, whose rows have one unit.
+    /// Effective masses of all rows (kg, kg·m²), for
+    /// [`energy`](crate::engine::constraints::records::point_vector::energy). `None` in a scene without joints,
+    /// whose rows have one unit.
     pub fn energy_masses(&mut self, phase: Phase) -> Option<PointVector> {
         let mut masses = self.system().has_joints().then(|| self.vector())?;
         self.with_system(phase, |system| system.lane_masses(&mut masses));

@@ -50,7 +50,7 @@ impl Conjugate {
     }
 
     /// The vectors and the masses, to return to the workspace.
-    pub fn vectors(self) -> ([PointVector; 3], Option<PointVector>) {
-        ([self.last, self.swept, self.direction], self.masses)
+    pub fn vectors(self) -> impl DoubleEndedIterator<Item = PointVector> {
+        [self.last, self.swept, self.direction].into_iter().chain(self.masses)
     }
 }

@@ -45,10 +45,11 @@
 //! # Crushed bodies
 //!
 //! A body that a heavy one presses against a floor, or against another heavy one, overlaps both. If two
-//! opposing overlaps with bodies of at least ten times its mass together exceed ρ, there is no room left for it. As soon as a normal turns, or the body rolls over a corner, the impulses that
-//! press it no longer cancel. They can be 2·10⁴ times its weight: a box of 0.05 kg under one of 320 kg left at
-//! 104 m/s. Its speed has the same bound, where V is the fastest surface that touches it. Its contacts keep
-//! their impulses, since the heavy body would sink without them.
+//! opposing overlaps with bodies of at least ten times its mass together exceed ρ, there is no room left for
+//! it. As soon as a normal turns, or the body rolls over a corner, the impulses that press it no longer cancel.
+//! They can be 2·10⁴ times its weight: a box of 0.05 kg under one of 320 kg left at 104 m/s. Its speed has the
+//! same bound, where V is the fastest surface that touches it. Its contacts keep their impulses, since the heavy
+//! body would sink without them.
 
 use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::constraints::Passes;
