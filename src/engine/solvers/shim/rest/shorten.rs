@@ -27,7 +27,7 @@
 //!
 //! Shortening a spring moves bodies apart, and bodies that touch at one point then roll. In a pile of discs
 //! some contact slips, loads change, and the pile swells and settles forever. So a contact of one point keeps
-//! its preload while that is between half and 1.1 times its load.
+//! its preload while that is between half and 1.1 times its load. Below that it rises like others.
 
 use super::closed::CALM_TIME;
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
@@ -51,7 +51,7 @@ pub(in super::super) struct Shorten {
     pub holds: bool,
 }
 
-/// Smallest preload that a contact of one point keeps, as a fraction of its load (1).
+/// Preload at which a contact of one point stops rising, as a fraction of its load (1).
 const LEAST: f32 = 0.5;
 
 /// Largest such preload, as a multiple of the load (1); see [`LEAST`].
@@ -109,8 +109,8 @@ fn shorten<L: Lanes>(
             one
         };
         let grows = (calm - L::splat(CALM_TIME)).select_positive(grows, zero);
-        let risen = |borne: L, load: L| {
-            let grown = grows.mul_add(load - borne, borne).min(load);
+        let risen = |borne: L, load: L, spring: L| {
+            let grown = if rises { grows.mul_add((load.min(spring) - borne).max(zero), borne).min(load) } else { load };
             (borne + L::splat(0.5)).select_positive(grown, load)
         };
         for p in 0..layout.points {
@@ -118,14 +118,12 @@ fn shorten<L: Lanes>(
             let mass = mass.select_positive(mass, one);
             let load = loads[2 * p].max(zero);
             let before = borne[p];
+            let spring = record[layout.at(p, layout.normal_impulse)].mul_add(L::splat(1.0 / h), before.max(zero));
+            borne[p] = risen(before, load, spring);
             if holds && p == 0 && is_single.any_positive() {
-                let kept = borne[0].max(L::splat(LEAST) * load).min(L::splat(MOST) * load);
-                let kept = borne[0].select_positive(kept, load);
-                borne[0] = is_single.select_positive(kept, risen(borne[0], load));
-            } else if rises {
-                borne[p] = risen(borne[p], load);
-            } else {
-                borne[p] = load;
+                let least = (L::splat(LEAST) * load - before).select_positive(borne[0], before);
+                let kept = is_single.select_positive(least.min(L::splat(MOST) * load), borne[0]);
+                borne[0] = (before + L::splat(0.5)).select_positive(kept, borne[0]);
             }
             let sag = compliance * borne[p] / mass;
             let at = layout.at(p, layout.normal_impulse);
