@@ -3,8 +3,13 @@
 //! A point is closed if three conditions hold. Its gap is below a fraction of the slop. Its normal speed is
 //! at most the speed that forces give resting bodies in a step, v ≤ dt (|a_a| + |a_b|). And it is still
 //! closed in the middle of the step: a load acts until the end of the step, and does work on bodies that have
-//! separated. So a sagging point counts as closed as long as it overlaps. The load of a newly closed point
-//! starts from the impulse of the last substep.
+//! separated. The load of a newly closed point starts from the impulse of the last substep, which it
+//! replaces. So a sagging point counts as closed as long as it overlaps. If its spring lost its impulse
+//! whenever a heavy body rocks on it, the rocking would not stop.
+//!
+//! Load sweeps can diverge where bodies are caught in each other, since friction makes their matrix
+//! indefinite. So they start from at most twice the force of the spring in the last substep. At rest that force
+//! is the load.
 //!
 //! A contact is calm if its points have been slower than 1 mm/s for 0.3 s, which is longer than a rocking
 //! body pauses between swings, and its bodies have not turned against each other faster than ω ρ = 1 mm/s, with
@@ -110,22 +115,22 @@ fn close<L: Lanes>(
             let is_closed = at(layout.normal_mass).min(is_free).select_positive(stays, zero);
             let has_borne = last[2 * p] + L::splat(0.5);
             let spring = at(layout.normal_impulse) * per_substep;
-            let normal = has_borne.select_positive(last[2 * p].min(spring + spring), spring);
-            loads[2 * p] = is_closed.select_positive(normal, open);
+            let fed = has_borne.select_positive(last[2 * p], spring);
+            loads[2 * p] = is_closed.select_positive(fed.min(spring + spring), open);
             // The rest of the impulses is what statics does not explain.
             let borne = if p == 0 { borne_0 } else { borne_1 };
-            let part = last[2 * p].select_positive(borne.max(zero) / last[2 * p], zero);
+            let part = last[2 * p].select_positive(borne.max(zero) / last[2 * p], one);
             let part = is_closed.select_positive(part * h, zero);
             let lacks =
                 (borne + L::splat(0.5)).select_positive(L::splat(NEARLY).mul_add(last[2 * p], -borne), zero);
             is_short = is_short.max(lacks);
             let at = layout.at(p, layout.normal_impulse);
-            record[at] = part.neg_mul_add(last[2 * p], record[at]);
+            record[at] = part.neg_mul_add(fed, record[at]);
             if layout.has_friction {
                 let at = layout.at(p, layout.tangent_impulse);
-                let tangent = has_borne.select_positive(last[2 * p + 1], record[at] * per_substep);
-                loads[2 * p + 1] = is_closed.select_positive(tangent, zero);
-                record[at] = part.neg_mul_add(last[2 * p + 1], record[at]);
+                let fed = has_borne.select_positive(last[2 * p + 1], record[at] * per_substep);
+                loads[2 * p + 1] = is_closed.select_positive(fed, zero);
+                record[at] = part.neg_mul_add(fed, record[at]);
             }
             let impulse = [loads[2 * p].max(zero) * h, loads[2 * p + 1] * h];
             push([&mut free_a, &mut free_b], [nx, ny], arms, impulse);
