@@ -7,15 +7,9 @@
 //! replaces. So a sagging point counts as closed as long as it overlaps. If its spring lost its impulse
 //! whenever a heavy body rocks on it, the rocking would not stop.
 //!
-//! Load sweeps can diverge where bodies are caught in each other, since friction makes their matrix
-//! indefinite. So they start from at most twice the force of the spring in the last substep. At rest that force
-//! is the load.
-//!
 //! A contact is calm if its points have been slower than 1 mm/s for 0.3 s, which is longer than a rocking
-//! body pauses between swings, and its bodies have not turned against each other faster than ω ρ = 1 mm/s, with
-//! ρ the radius of gyration. The point on which a body rocks does not move, but bears a load that varies.
-//! If the springs of a calm contact are shortened for nearly all of its load, they follow the load at once
-//! from then on ([`super::shorten`]).
+//! body pauses between swings. If its springs are also shortened for nearly all of its load, they follow the
+//! load at once from then on ([`super::shorten`]).
 //!
 //! The part of the impulses for which springs are not shortened is the part that statics does not explain.
 
@@ -80,7 +74,6 @@ fn close<L: Lanes>(
     let increments: &[Quad] = bytemuck::cast_slice(increments);
     let (zero, one, open) = (L::zero(), L::splat(1.0), L::splat(OPEN));
     let (closed, half_step) = (L::splat(CLOSED * length_unit), L::splat(0.5 * dt));
-    let slow = L::splat(CALM_SPEED * length_unit);
     let (per_step, per_substep, h) = (L::splat(dt / h), L::splat(1.0 / h), L::splat(h));
     let rows_of = row_a.batches().zip(row_b.batches());
     for (batch, ((record, index), (row_a, row_b))) in records.zip(rows_of).enumerate() {
@@ -114,25 +107,25 @@ fn close<L: Lanes>(
             let stays = near.min(still - speed).min(closed - in_the_middle);
             let is_closed = at(layout.normal_mass).min(is_free).select_positive(stays, zero);
             let has_borne = last[2 * p] + L::splat(0.5);
-            let spring = at(layout.normal_impulse) * per_substep;
-            let fed = has_borne.select_positive(last[2 * p], spring);
-            loads[2 * p] = is_closed.select_positive(fed.min(spring + spring), open);
+            let begun = |kept: L, impulse: L| has_borne.select_positive(kept, impulse * per_substep);
+            let normal = begun(last[2 * p], at(layout.normal_impulse));
+            let tangent =
+                if layout.has_friction { begun(last[2 * p + 1], at(layout.tangent_impulse)) } else { zero };
+            loads[2 * p] = is_closed.select_positive(normal, open);
+            loads[2 * p + 1] = is_closed.select_positive(tangent, zero);
+            let impulse = [loads[2 * p].max(zero) * h, loads[2 * p + 1] * h];
             // The rest of the impulses is what statics does not explain.
             let borne = if p == 0 { borne_0 } else { borne_1 };
             let part = last[2 * p].select_positive(borne.max(zero) / last[2 * p], one);
-            let part = is_closed.select_positive(part * h, zero);
             let lacks =
                 (borne + L::splat(0.5)).select_positive(L::splat(NEARLY).mul_add(last[2 * p], -borne), zero);
             is_short = is_short.max(lacks);
             let at = layout.at(p, layout.normal_impulse);
-            record[at] = part.neg_mul_add(fed, record[at]);
+            record[at] = part.neg_mul_add(impulse[0], record[at]);
             if layout.has_friction {
                 let at = layout.at(p, layout.tangent_impulse);
-                let fed = has_borne.select_positive(last[2 * p + 1], record[at] * per_substep);
-                loads[2 * p + 1] = is_closed.select_positive(fed, zero);
-                record[at] = part.neg_mul_add(fed, record[at]);
+                record[at] = part.neg_mul_add(impulse[1], record[at]);
             }
-            let impulse = [loads[2 * p].max(zero) * h, loads[2 * p + 1] * h];
             push([&mut free_a, &mut free_b], [nx, ny], arms, impulse);
         }
         L::scatter_velocity(fields, row_b, [free_b[0], free_b[1], free_b[2], free_b[3]]);
@@ -141,11 +134,7 @@ fn close<L: Lanes>(
         }
         store::<L, 0>(quads, index, segment.filled(batch, L::WIDTH), loads);
         let calm = (calm + L::splat(dt)).min(L::splat(2.0 * CALM_TIME));
-        let calm = (slow - fastest).select_positive(calm, zero);
-        let spin = b[2] - a[2];
-        // ω² ρ² > v², with ρ² = I/m, multiplied by 1/I.
-        let turns = |body: &[L; 8]| (spin * spin).mul_add(body[3], -(slow * slow * body[7]));
-        let calm = turns(&a).max(turns(&b)).select_positive(zero, calm);
+        let calm = (L::splat(CALM_SPEED * length_unit) - fastest).select_positive(calm, zero);
         let at_once = calm - L::splat(CALM_TIME);
         let is_pair = if layout.points == 2 { record[layout.at(1, layout.normal_mass)] } else { zero };
         let at_once = is_pair.select_positive(is_short.select_positive(zero, at_once), zero);

@@ -12,16 +12,13 @@
 //! so shortening a spring while its body moves drives the motion. If δ stays, the deflection is lost to the
 //! damper.
 //!
-//! Let the preload F be the load for which a spring is shortened, N its load, and λ/h the force of the spring in
-//! the last substep. The preload follows a falling load at once, which does no work that the load has not done. It
-//! follows a rising load only if the contact is calm ([`super::closed`]), within τ = 3 s, a few periods of a
-//! swaying column, and only up to the force of the spring:
+//! Let the preload F be the load for which a spring is shortened, and N its load. The preload follows a
+//! falling load at once, which does no work that the load has not done. It follows a rising load only if the
+//! contact is calm ([`super::closed`]), within τ = 3 s, a few periods of a swaying column:
 //!
 //! ```text
-//! F ← min(N, F + max(0, min(N, λ/h) − F) dt/(τ + dt))
+//! F ← min(N, F + (N − F) dt/(τ + dt))
 //! ```
-//!
-//! At rest λ/h = N. Where bodies rock or are caught in each other, statics can claim loads that no spring bears.
 //!
 //! Calm contacts whose preload is nearly their whole load follow at once, so leaning columns get the moment
 //! that they need. So do contacts found in the first step of one of their bodies.
@@ -30,7 +27,7 @@
 //!
 //! Shortening a spring moves bodies apart, and bodies that touch at one point then roll. In a pile of discs
 //! some contact slips, loads change, and the pile swells and settles forever. So a contact of one point keeps
-//! its preload while that is between half and 1.1 times its load. Below that it rises like others.
+//! its preload while that is between half and 1.1 times its load.
 
 use super::closed::CALM_TIME;
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
@@ -54,7 +51,7 @@ pub(in super::super) struct Shorten {
     pub holds: bool,
 }
 
-/// Preload at which a contact of one point stops rising, as a fraction of its load (1).
+/// Smallest preload that a contact of one point keeps, as a fraction of its load (1).
 const LEAST: f32 = 0.5;
 
 /// Largest such preload, as a multiple of the load (1); see [`LEAST`].
@@ -94,8 +91,7 @@ fn shorten<L: Lanes>(
     // Sag per load and effective mass (s²).
     let compliance = L::splat(h * impulse_scale / (mass_scale * bias_rate));
     let grows = L::splat(dt / (RISE + dt));
-    let (zero, one) = (L::zero(), L::splat(1.0));
-    let (h_lanes, per_substep) = (L::splat(h), L::splat(1.0 / h));
+    let (zero, one, h_lanes) = (L::zero(), L::splat(1.0), L::splat(h));
     let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride);
     let quads: &mut [Quad] = bytemuck::cast_slice_mut(kept);
@@ -113,9 +109,8 @@ fn shorten<L: Lanes>(
             one
         };
         let grows = (calm - L::splat(CALM_TIME)).select_positive(grows, zero);
-        let risen = |borne: L, load: L, spring: L| {
-            let rise = (load.min(spring) - borne).max(zero);
-            let grown = if rises { grows.mul_add(rise, borne).min(load) } else { load };
+        let risen = |borne: L, load: L| {
+            let grown = grows.mul_add(load - borne, borne).min(load);
             (borne + L::splat(0.5)).select_positive(grown, load)
         };
         for p in 0..layout.points {
@@ -123,16 +118,17 @@ fn shorten<L: Lanes>(
             let mass = mass.select_positive(mass, one);
             let load = loads[2 * p].max(zero);
             let before = borne[p];
-            // The preload has been subtracted from the impulse.
-            let at = layout.at(p, layout.normal_impulse);
-            let spring = record[at].mul_add(per_substep, before.max(zero));
-            borne[p] = risen(before, load, spring);
             if holds && p == 0 && is_single.any_positive() {
-                let kept = (L::splat(LEAST) * load - before).select_positive(borne[0], before);
-                let kept = is_single.select_positive(kept.min(L::splat(MOST) * load), borne[0]);
-                borne[0] = (before + L::splat(0.5)).select_positive(kept, borne[0]);
+                let kept = borne[0].max(L::splat(LEAST) * load).min(L::splat(MOST) * load);
+                let kept = borne[0].select_positive(kept, load);
+                borne[0] = is_single.select_positive(kept, risen(borne[0], load));
+            } else if rises {
+                borne[p] = risen(borne[p], load);
+            } else {
+                borne[p] = load;
             }
             let sag = compliance * borne[p] / mass;
+            let at = layout.at(p, layout.normal_impulse);
             // A rise is already in the impulse: the spring has deflected under it.
             let known = (before + L::splat(0.5)).select_positive(borne[p].min(before), borne[p]);
             record[at] = known.mul_add(h_lanes, record[at]).max(zero);
