@@ -96,9 +96,12 @@ fn median_speed(seed: u64, without: Without) -> f64 {
 /// the shortening of its springs.
 #[test]
 fn a_pile_of_discs_hardly_breathes() {
-    let held = median_speed(1, Without::default());
     let without = Without::default().and(find("shim").unwrap().mechanism("held").unwrap());
-    let free = median_speed(1, without);
+    let [held, free] = [Without::default(), without].map(|without| {
+        let mut speeds = [1, 2, 3].map(|seed| median_speed(seed, without));
+        speeds.sort_by(f64::total_cmp);
+        speeds[1]
+    });
     assert!(free > 5.0 * held && held < 1e-3, "{held} m/s, and {free} m/s without");
 }
 

@@ -14,11 +14,15 @@
 //!
 //! Let the preload F be the load for which a spring is shortened, and N its load. The preload follows a
 //! falling load at once, which does no work that the load has not done. It follows a rising load only if the
-//! contact is calm ([`super::closed`]), within τ = 3 s, a few periods of a swaying column:
+//! contact is calm ([`super::closed`]), within τ = 3 s, a few periods of a swaying column, and only up to the
+//! force λ/h of the spring in the last substep:
 //!
 //! ```text
-//! F ← min(N, F + (N − F) dt/(τ + dt))
+//! F ← min(N, F + max(0, min(N, λ/h) − F) dt/(τ + dt))
 //! ```
+//!
+//! At rest λ/h = N. Where a body rocks or several bodies are caught in each other, N and λ/h differ, and a spring
+//! shortened for more than it carries pushes.
 //!
 //! Calm contacts whose preload is nearly their whole load follow at once, so leaning columns get the moment
 //! that they need. So do contacts found in the first step of one of their bodies.
@@ -91,7 +95,8 @@ fn shorten<L: Lanes>(
     // Sag per load and effective mass (s²).
     let compliance = L::splat(h * impulse_scale / (mass_scale * bias_rate));
     let grows = L::splat(dt / (RISE + dt));
-    let (zero, one, h_lanes) = (L::zero(), L::splat(1.0), L::splat(h));
+    let (zero, one) = (L::zero(), L::splat(1.0));
+    let (h_lanes, per_substep) = (L::splat(h), L::splat(1.0 / h));
     let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride);
     let quads: &mut [Quad] = bytemuck::cast_slice_mut(kept);
@@ -109,8 +114,9 @@ fn shorten<L: Lanes>(
             one
         };
         let grows = (calm - L::splat(CALM_TIME)).select_positive(grows, zero);
-        let risen = |borne: L, load: L| {
-            let grown = grows.mul_add(load - borne, borne).min(load);
+        let risen = |borne: L, load: L, spring: L| {
+            let rise = (load.min(spring) - borne).max(zero);
+            let grown = grows.mul_add(rise, borne).min(load);
             (borne + L::splat(0.5)).select_positive(grown, load)
         };
         for p in 0..layout.points {
@@ -118,17 +124,19 @@ fn shorten<L: Lanes>(
             let mass = mass.select_positive(mass, one);
             let load = loads[2 * p].max(zero);
             let before = borne[p];
+            // The preload has been subtracted from the impulse.
+            let at = layout.at(p, layout.normal_impulse);
+            let spring = record[at].mul_add(per_substep, before.max(zero));
             if holds && p == 0 && is_single.any_positive() {
                 let kept = borne[0].max(L::splat(LEAST) * load).min(L::splat(MOST) * load);
                 let kept = borne[0].select_positive(kept, load);
-                borne[0] = is_single.select_positive(kept, risen(borne[0], load));
+                borne[0] = is_single.select_positive(kept, risen(borne[0], load, spring));
             } else if rises {
-                borne[p] = risen(borne[p], load);
+                borne[p] = risen(borne[p], load, spring);
             } else {
                 borne[p] = load;
             }
             let sag = compliance * borne[p] / mass;
-            let at = layout.at(p, layout.normal_impulse);
             // A rise is already in the impulse: the spring has deflected under it.
             let known = (before + L::splat(0.5)).select_positive(borne[p].min(before), borne[p]);
             record[at] = known.mul_add(h_lanes, record[at]).max(zero);
