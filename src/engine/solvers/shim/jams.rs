@@ -13,7 +13,7 @@
 //! n₁ · n₂ < −1/2
 //! ```
 //!
-//! that are both deeper than the slop start a step without impulses. Within the step their normals stay fixed, so
+//! that are both deeper than the slop, and by four slops together, start a step without impulses. Within the step their normals stay fixed, so
 //! impulses that cancel keep canceling. Contacts of a wedge at rest are far less deep, and keep theirs.
 //!
 //! Bodies welded to a static or kinematic body count as that body: a rod between two planks of a beam has one
@@ -22,8 +22,10 @@
 //! # Squeezes
 //!
 //! The same happens if a kinematic body leaves others no room. A body is in a squeeze if it touches a
-//! kinematic body, or contacts deeper than the slop connect it with one that does; it is in a jam there if
-//! two of its deep contacts oppose each other, whichever bodies they touch. All contacts of such a body, also
+//! kinematic body, or contacts deeper than the slop connect it with one that does. With s₁ and s₂ the separations
+//! of two contacts that oppose each other, whichever bodies they touch, the body has the room s₁ + s₂. It is in a
+//! jam if that is below −4 slops: what overlaps a pressed body by 12 cm and touches a wall behind it is as jammed as
+//! what overlaps both. All contacts of such a body, also
 //! those that are not deep, start a step without impulses: three that press from three sides hold each other
 //! as well. Bodies under a heavy one, which are as deep in each other, keep their impulses.
 //!
@@ -51,6 +53,8 @@
 //! same bound, where V is the fastest surface that touches it. Its contacts keep their impulses, since the heavy
 //! body would sink without them.
 
+use glam::Vec2;
+
 use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::constraints::Passes;
 use crate::engine::constraints::kernels::types::Joined;
@@ -63,16 +67,19 @@ use crate::engine::narrowphase::Margins;
 /// Normals with a smaller product oppose each other (1).
 const OPPOSED: f32 = -0.5;
 
+/// Two contacts leave a body no room if they oppose each other and overlap by more than this together (slops).
+const NO_ROOM: f32 = 4.0;
+
 /// Bodies of this many times the mass of another one crush it (1).
 const HEAVY: f32 = 10.0;
 
-/// A deep contact: the bodies by which it is grouped, its index, and whether the normal keeps its sign.
+/// A contact: the bodies by which it is grouped, its index, and whether the normal keeps its sign.
 type DeepContact = ([u32; 2], u32, bool);
 
 /// Finds jams; reuses its memory from step to step.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Jams {
-    /// Deep contacts, by pair of bodies, and once more by each body that may be jammed between others.
+    /// Deep contacts, by pair of bodies, and the contacts of each body that may be jammed between others.
     deep: Vec<DeepContact>,
     /// Bodies that touch a kinematic one, and how fast its surface is there (m/s).
     pressed: Vec<(u32, f32)>,
@@ -107,28 +114,33 @@ impl Jams {
         if !self.deep.is_empty() {
             self.hold(types, bodies);
         }
-        self.squeeze(bodies);
+        self.squeeze(bodies, contacts);
         self.deep.sort_unstable();
         for group in self.deep.chunk_by(|p, q| p.0 == q.0).filter(|group| group.len() > 1) {
             let [body, same] = group[0].0;
             if body != same && bodies.is_dynamic(body as usize) && bodies.is_dynamic(same as usize) {
                 continue;
             }
-            // In a squeeze any opposing overlaps jam a body; elsewhere only those that crush it.
+            // Between contacts that oppose each other. A body in no squeeze is crushed, or free.
             let room = if body == same && self.squeezed[body as usize] < 0.0 {
                 square_gyration(bodies, body).sqrt()
             } else {
-                0.0
+                NO_ROOM * slop
             };
-            for k in 0..group.len() {
-                if !(0..group.len()).any(|other| oppose(contacts, [&group[k], &group[other]], room)) {
+            for pushing in group {
+                let (n, depth) = overlap(contacts, pushing);
+                let opposes = |other| {
+                    let (m, other) = overlap(contacts, other);
+                    n.dot(m) < OPPOSED && depth + other > room
+                };
+                if depth <= slop || !group.iter().any(opposes) {
                     continue;
                 }
                 if body == same {
                     self.jammed.push((body, self.squeezed[body as usize]));
                     break;
                 }
-                forget(&mut contacts[group[k].1 as usize]);
+                forget(&mut contacts[pushing.1 as usize]);
             }
         }
         if self.jammed.is_empty() {
@@ -201,8 +213,8 @@ impl Jams {
         }
     }
 
-    /// Finds the squeezes, and lists deep contacts once more, by body.
-    fn squeeze(&mut self, bodies: &Bodies) {
+    /// Finds the squeezes, and lists the contacts of bodies in them, and deep ones of bodies that may be crushed.
+    fn squeeze(&mut self, bodies: &Bodies, contacts: &[Contact]) {
         if self.deep.is_empty() {
             return;
         }
@@ -229,8 +241,18 @@ impl Jams {
             let ([a, b], i, _) = self.deep[k];
             for (own, other, is_own) in [(a, b, false), (b, a, true)] {
                 let is_crushed = HEAVY * bodies.inv_mass[other as usize] <= bodies.inv_mass[own as usize];
-                if self.squeezed[own as usize] >= 0.0 || is_dynamic(own) && is_crushed {
+                if self.squeezed[own as usize] < 0.0 && is_dynamic(own) && is_crushed {
                     self.deep.push(([own; 2], i, is_own));
+                }
+            }
+        }
+        if self.pressed.is_empty() {
+            return;
+        }
+        for (i, contact) in contacts.iter().enumerate() {
+            for (own, is_own) in [(contact.body_a, false), (contact.body_b, true)] {
+                if self.squeezed[own as usize] >= 0.0 {
+                    self.deep.push(([own; 2], i as u32, is_own));
                 }
             }
         }
@@ -247,14 +269,11 @@ impl Jams {
     }
 }
 
-/// Whether two deep contacts of one group push against each other and overlap by more than `room` together (m).
-fn oppose(contacts: &[Contact], [p, q]: [&DeepContact; 2], room: f32) -> bool {
-    let [(n, depth), (m, other)] = [p, q].map(|&(_, i, is_own)| {
-        let manifold = &contacts[i as usize].manifold;
-        let depth = manifold.points().iter().map(|point| -point.separation).fold(0.0, f32::max);
-        (if is_own { manifold.normal } else { -manifold.normal }, depth)
-    });
-    n.dot(m) < OPPOSED && depth + other > room
+/// The normal of a contact as its body sees it, and its largest overlap (m), negative for a gap.
+fn overlap(contacts: &[Contact], &(_, i, is_own): &DeepContact) -> (Vec2, f32) {
+    let manifold = &contacts[i as usize].manifold;
+    let depth = manifold.points().iter().map(|point| -point.separation).fold(f32::MIN, f32::max);
+    (if is_own { manifold.normal } else { -manifold.normal }, depth)
 }
 
 /// ρ² (m²); infinite for a body that cannot turn.
