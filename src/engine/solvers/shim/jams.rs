@@ -87,6 +87,8 @@ pub(super) struct Jams {
     squeezed: Vec<f32>,
     /// Bodies in a jam of a squeeze and crushed bodies, by number, and the bound of their speed (m/s).
     jammed: Vec<(u32, f32)>,
+    /// Bodies in a jam of a squeeze, whose contacts start this step and the next without impulses, by number.
+    released: Vec<u32>,
     /// Bodies that welds hold together.
     welded: DisjointSets,
     /// Non-dynamic body of each welded set, if any, at the lowest index of the set. `[bodies]`
@@ -101,7 +103,14 @@ impl Jams {
         self.deep.clear();
         self.pressed.clear();
         self.jammed.clear();
-        for (i, contact) in contacts.iter().enumerate() {
+        for (i, contact) in contacts.iter_mut().enumerate() {
+            if !self.released.is_empty()
+                && [contact.body_a, contact.body_b]
+                    .iter()
+                    .any(|body| self.released.binary_search(body).is_ok())
+            {
+                forget(contact);
+            }
             if contact.manifold.points().iter().any(|point| point.separation < -slop) {
                 self.deep.push(([contact.body_a, contact.body_b], i as u32, true));
             }
@@ -111,6 +120,7 @@ impl Jams {
                 }
             }
         }
+        self.released.clear();
         if !self.deep.is_empty() {
             self.hold(types, bodies);
         }
@@ -137,7 +147,11 @@ impl Jams {
                     continue;
                 }
                 if body == same {
-                    self.jammed.push((body, self.squeezed[body as usize]));
+                    let speed = self.squeezed[body as usize];
+                    self.jammed.push((body, speed));
+                    if speed >= 0.0 {
+                        self.released.push(body);
+                    }
                     break;
                 }
                 forget(&mut contacts[pushing.1 as usize]);
@@ -194,6 +208,7 @@ impl Jams {
     /// Clears the list of bodies in a jam.
     pub fn clear(&mut self) {
         self.jammed.clear();
+        self.released.clear();
     }
 
     /// Bounds the speeds of bodies in a jam.
@@ -264,6 +279,7 @@ impl Jams {
             + held(&self.pressed)
             + held(&self.squeezed)
             + held(&self.jammed)
+            + held(&self.released)
             + self.welded.bytes()
             + held(&self.holders)
     }
