@@ -7,6 +7,7 @@ use simpulse::engine::params::Without;
 use simpulse::engine::solvers::{DEFAULT, find};
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
+use simpulse::lab::torture::{family, run_solver};
 
 fn pair(
     angles: [f64; 2],
@@ -92,6 +93,17 @@ fn a_body_that_lands_lies_on_the_ground_and_not_where_the_step_found_it() {
         let world = crate::common::run(&scene, crate::common::settings(find(DEFAULT).unwrap()), 3);
         let [_, y] = world.bodies.center(1);
         assert!((y - 0.5).abs() < 1e-6 && world.bodies.velocity_y[1].abs() < 1e-6, "{height}: {y}");
+    }
+}
+
+/// Three kinds of squeezes: a body overlaps a pressed one and only touches the wall behind it, the normals of a jam turn
+/// from one step to the next until they no longer oppose each other, and a body without room is pressed sideways.
+#[test]
+fn what_a_piston_presses_is_not_shot_away() {
+    let settings = Settings::new(find(DEFAULT).unwrap());
+    for (seed, number) in [(1, 2339), (4, 3515), (6, 3015), (5, 1658), (4, 441)] {
+        let outcome = run_solver(&family("driven").unwrap().case(seed, number), &settings).unwrap();
+        assert!(outcome.energy < 1.2, "driven:{number} of seed {seed}: {} energy budgets", outcome.energy);
     }
 }
 

@@ -29,6 +29,9 @@
 //! those that are not deep, start a step without impulses: three that press from three sides hold each other
 //! as well. Bodies under a heavy one, which are as deep in each other, keep their impulses.
 //!
+//! Normals turn between steps. Where a jam ends that way, its last step has left impulses that cancel no longer, so
+//! its contacts start the next step without them as well.
+//!
 //! # Bound of the speed
 //!
 //! The closing speed V of the squeezing surfaces cannot be removed, so each of the sweeps adds m V to
