@@ -10,7 +10,7 @@
 //! So contacts of the same two bodies with
 //!
 //! ```text
-//! n₁ · n₂ < −1/2
+//! n₁ · n₂ < −1/4
 //! ```
 //!
 //! that are both deeper than the slop, and by four slops together, start a step without impulses. Within the step their normals stay fixed, so
@@ -67,8 +67,9 @@ use crate::engine::disjoint::DisjointSets;
 use crate::engine::lanes::held;
 use crate::engine::narrowphase::Margins;
 
-/// Normals with a smaller product oppose each other (1).
-const OPPOSED: f32 = -0.5;
+/// Normals with a smaller product oppose each other (1). Friction holds a body in a wedge, so that impulses can grow
+/// without bound, up to n₁ · n₂ = −(1 − µ²)/(1 + µ²), which is −1/4 with µ = 0.77.
+const OPPOSED: f32 = -0.25;
 
 /// Two contacts leave a body no room if they oppose each other and overlap by more than this together (slops).
 const NO_ROOM: f32 = 4.0;
