@@ -96,8 +96,9 @@ fn a_body_that_lands_lies_on_the_ground_and_not_where_the_step_found_it() {
     }
 }
 
-/// Three kinds of squeezes: a body overlaps a pressed one and only touches the wall behind it, the normals of a jam turn
-/// from one step to the next until they no longer oppose each other, and a body without room is pressed sideways.
+/// Three kinds of squeezes: a body overlaps a pressed one and only touches the wall behind it, the normals of a
+/// jam turn from one step to the next until they no longer oppose each other, and a body without room is pressed
+/// sideways.
 #[test]
 fn what_a_piston_presses_is_not_shot_away() {
     let settings = Settings::new(find(DEFAULT).unwrap());

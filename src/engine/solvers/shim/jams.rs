@@ -13,8 +13,9 @@
 //! n₁ · n₂ < −1/4
 //! ```
 //!
-//! that are both deeper than the slop, and by four slops together, start a step without impulses. Within the step their normals stay fixed, so
-//! impulses that cancel keep canceling. Contacts of a wedge at rest are far less deep, and keep theirs.
+//! that are both deeper than the slop, and by four slops together, start a step without impulses. Within the step
+//! their normals stay fixed, so impulses that cancel keep canceling. Contacts of a wedge at rest are far less deep,
+//! and keep theirs.
 //!
 //! Bodies welded to a static or kinematic body count as that body: a rod between two planks of a beam has one
 //! body on both sides.
@@ -25,9 +26,9 @@
 //! kinematic body, or contacts deeper than the slop connect it with one that does. With s₁ and s₂ the separations
 //! of two contacts that oppose each other, whichever bodies they touch, the body has the room s₁ + s₂. It is in a
 //! jam if that is below −4 slops: what overlaps a pressed body by 12 cm and touches a wall behind it is as jammed as
-//! what overlaps both. All contacts of such a body, also
-//! those that are not deep, start a step without impulses: three that press from three sides hold each other
-//! as well. Bodies under a heavy one, which are as deep in each other, keep their impulses.
+//! what overlaps both. All contacts of such a body, also those that are not deep, start a step without impulses:
+//! three that press from three sides hold each other as well. Bodies under a heavy one, which are as deep in each
+//! other, keep their impulses.
 //!
 //! Normals turn between steps. Where a jam ends that way, its last step has left impulses that cancel no longer, so
 //! its contacts start the next step without them as well.
@@ -56,8 +57,6 @@
 //! same bound, where V is the fastest surface that touches it. Its contacts keep their impulses, since the heavy
 //! body would sink without them.
 
-use glam::Vec2;
-
 use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::constraints::Passes;
 use crate::engine::constraints::kernels::types::Joined;
@@ -66,6 +65,7 @@ use crate::engine::contacts::{Contact, ManifoldPoint};
 use crate::engine::disjoint::DisjointSets;
 use crate::engine::lanes::held;
 use crate::engine::narrowphase::Margins;
+use glam::Vec2;
 
 /// Normals with a smaller product oppose each other (1). Friction holds a body in a wedge, so that impulses can grow
 /// without bound, up to n₁ · n₂ = −(1 − µ²)/(1 + µ²), which is −1/4 with µ = 0.77.
@@ -78,13 +78,13 @@ const NO_ROOM: f32 = 4.0;
 const HEAVY: f32 = 10.0;
 
 /// A contact: the bodies by which it is grouped, its index, and whether the normal keeps its sign.
-type DeepContact = ([u32; 2], u32, bool);
+type GroupedContact = ([u32; 2], u32, bool);
 
 /// Finds jams; reuses its memory from step to step.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Jams {
     /// Deep contacts, by pair of bodies, and the contacts of each body that may be jammed between others.
-    deep: Vec<DeepContact>,
+    deep: Vec<GroupedContact>,
     /// Bodies that touch a kinematic one, and how fast its surface is there (m/s).
     pressed: Vec<(u32, f32)>,
     /// V of the squeeze that a body is in (m/s), negative if it is in none.
@@ -290,7 +290,7 @@ impl Jams {
 }
 
 /// The normal of a contact as its body sees it, and its largest overlap (m), negative for a gap.
-fn overlap(contacts: &[Contact], &(_, i, is_own): &DeepContact) -> (Vec2, f32) {
+fn overlap(contacts: &[Contact], &(_, i, is_own): &GroupedContact) -> (Vec2, f32) {
     let manifold = &contacts[i as usize].manifold;
     let depth = manifold.points().iter().map(|point| -point.separation).fold(f32::MIN, f32::max);
     (if is_own { manifold.normal } else { -manifold.normal }, depth)

@@ -287,8 +287,9 @@ mod tests {
                 square += answer.sum::<f32>();
             }
             let share = square.sqrt().clamp(LEAST as f32, 1.0);
-            // The rest of a push in f32 has the rounding error of the whole push. In a mode of stiffness k, γ ‖K‖/(k + γ ‖K‖)
-            // of it remains, and an elimination of n links changes k by n ε ‖K‖/2: a part of at most n ε/2γ.
+            // The rest of a push in f32 has the rounding error of the whole push. In a mode of stiffness k,
+            // γ ‖K‖/(k + γ ‖K‖) of it remains, and an elimination of n links changes k by n ε ‖K‖/2, so that
+            // remainder by a part of at most n ε/2γ.
             let part = links as f32 * 0.5 * f32::EPSILON / GIVE;
             let off = (shares[loaded] - share).abs();
             prop_assert!(off < part * share + 3e-4, "{} instead of {share}", shares[loaded]);
