@@ -89,10 +89,9 @@ pub(super) struct Jams {
     pressed: Vec<(u32, f32)>,
     /// V of the squeeze that a body is in (m/s), negative if it is in none.
     squeezed: Vec<f32>,
-    /// Bodies in a jam of a squeeze and crushed bodies, by number, and the bound of their speed (m/s).
+    /// Bodies in a jam of a squeeze and crushed bodies, by number, and the bound of their speed (m/s); those of the
+    /// last step until this step's are known.
     jammed: Vec<(u32, f32)>,
-    /// Bodies in a jam of a squeeze, whose contacts start this step and the next without impulses, by number.
-    released: Vec<u32>,
     /// Bodies that welds hold together.
     welded: DisjointSets,
     /// Non-dynamic body of each welded set, if any, at the lowest index of the set. `[bodies]`
@@ -106,15 +105,10 @@ impl Jams {
         let (contacts, bodies, types) = (&mut *scene.contacts, scene.bodies, scene.types);
         self.deep.clear();
         self.pressed.clear();
+        // Jams of the last step.
+        self.forget_jams(contacts);
         self.jammed.clear();
-        for (i, contact) in contacts.iter_mut().enumerate() {
-            if !self.released.is_empty()
-                && [contact.body_a, contact.body_b]
-                    .iter()
-                    .any(|body| self.released.binary_search(body).is_ok())
-            {
-                forget(contact);
-            }
+        for (i, contact) in contacts.iter().enumerate() {
             if contact.manifold.points().iter().any(|point| point.separation < -slop) {
                 self.deep.push(([contact.body_a, contact.body_b], i as u32, true));
             }
@@ -124,7 +118,6 @@ impl Jams {
                 }
             }
         }
-        self.released.clear();
         if !self.deep.is_empty() {
             self.hold(types, bodies);
         }
@@ -135,7 +128,7 @@ impl Jams {
             if body != same && bodies.is_dynamic(body as usize) && bodies.is_dynamic(same as usize) {
                 continue;
             }
-            // Between contacts that oppose each other. A body in no squeeze is crushed, or free.
+            // What opposing contacts may overlap together. Outside a squeeze only heavy bodies leave no room.
             let room = if body == same && self.squeezed[body as usize] < 0.0 {
                 square_gyration(bodies, body).sqrt()
             } else {
@@ -151,11 +144,7 @@ impl Jams {
                     continue;
                 }
                 if body == same {
-                    let speed = self.squeezed[body as usize];
-                    self.jammed.push((body, speed));
-                    if speed >= 0.0 {
-                        self.released.push(body);
-                    }
+                    self.jammed.push((body, self.squeezed[body as usize]));
                     break;
                 }
                 forget(&mut contacts[pushing.1 as usize]);
@@ -164,12 +153,10 @@ impl Jams {
         if self.jammed.is_empty() {
             return;
         }
-        for contact in contacts.iter_mut() {
+        self.forget_jams(contacts);
+        for contact in contacts.iter() {
             for (by, of) in [(contact.body_a, contact.body_b), (contact.body_b, contact.body_a)] {
-                let Ok(k) = self.jammed.binary_search_by_key(&of, |jammed| jammed.0) else { continue };
-                if self.squeezed[of as usize] >= 0.0 {
-                    forget(contact);
-                } else {
+                if let Some(k) = self.jam(of).filter(|_| self.squeezed[of as usize] < 0.0) {
                     self.jammed[k].1 = self.jammed[k].1.max(surface_speed(bodies, contact, by));
                 }
             }
@@ -178,6 +165,24 @@ impl Jams {
             let (i, square) = (*body as usize, square_gyration(bodies, *body));
             let had = speed(bodies.velocity(i).to_array(), bodies.angular_velocity[i], square);
             *most = (2.0 * *most + push_speed).max(had + scene.gravity.length() * scene.dt);
+        }
+    }
+
+    /// Index in the list of bodies in a jam.
+    fn jam(&self, body: u32) -> Option<usize> {
+        self.jammed.binary_search_by_key(&body, |jammed| jammed.0).ok()
+    }
+
+    /// Zeroes the impulses of bodies in a jam of a squeeze.
+    fn forget_jams(&self, contacts: &mut [Contact]) {
+        if self.jammed.is_empty() {
+            return;
+        }
+        let is_released = |body| self.jam(body).is_some() && self.squeezed[body as usize] >= 0.0;
+        for contact in contacts {
+            if is_released(contact.body_a) || is_released(contact.body_b) {
+                forget(contact);
+            }
         }
     }
 
@@ -212,7 +217,6 @@ impl Jams {
     /// Clears the list of bodies in a jam.
     pub fn clear(&mut self) {
         self.jammed.clear();
-        self.released.clear();
     }
 
     /// Bounds the speeds of bodies in a jam.
@@ -283,7 +287,6 @@ impl Jams {
             + held(&self.pressed)
             + held(&self.squeezed)
             + held(&self.jammed)
-            + held(&self.released)
             + self.welded.bytes()
             + held(&self.holders)
     }
