@@ -47,15 +47,6 @@
 //! ```
 //!
 //! Velocities beyond that are scaled down in each substep before bodies move, and at its end.
-//!
-//! # Crushed bodies
-//!
-//! A body that a heavy one presses against a floor, or against another heavy one, overlaps both. If two
-//! opposing overlaps with bodies of at least ten times its mass together exceed ρ, there is no room left for
-//! it. As soon as a normal turns, or the body rolls over a corner, the impulses that press it no longer cancel.
-//! They can be 2·10⁴ times its weight: a box of 0.05 kg under one of 320 kg left at 104 m/s. Its speed has the
-//! same bound, where V is the fastest surface that touches it. Its contacts keep their impulses, since the heavy
-//! body would sink without them.
 
 use crate::engine::bodies::{Bodies, BodyKind};
 use crate::engine::constraints::Passes;
@@ -74,23 +65,20 @@ const OPPOSED: f32 = -0.25;
 /// Two contacts leave a body no room if they oppose each other and overlap by more than this together (slops).
 const NO_ROOM: f32 = 4.0;
 
-/// Bodies of this many times the mass of another one crush it (1).
-const HEAVY: f32 = 10.0;
-
 /// A contact: the bodies by which it is grouped, its index, and whether the normal keeps its sign.
 type GroupedContact = ([u32; 2], u32, bool);
 
 /// Finds jams; reuses its memory from step to step.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Jams {
-    /// Deep contacts, by pair of bodies, and the contacts of each body that may be jammed between others.
+    /// Deep contacts, by pair of bodies, and the contacts of each body in a squeeze.
     deep: Vec<GroupedContact>,
     /// Bodies that touch a kinematic one, and how fast its surface is there (m/s).
     pressed: Vec<(u32, f32)>,
     /// V of the squeeze that a body is in (m/s), negative if it is in none.
     squeezed: Vec<f32>,
-    /// Bodies in a jam of a squeeze and crushed bodies, by number, and the bound of their speed (m/s); those of the
-    /// last step until this step's are known.
+    /// Bodies in a jam of a squeeze, by number, and the bound of their speed (m/s); those of the last step until
+    /// this step's are known.
     jammed: Vec<(u32, f32)>,
     /// Bodies that welds hold together.
     welded: DisjointSets,
@@ -128,17 +116,11 @@ impl Jams {
             if body != same && bodies.is_dynamic(body as usize) && bodies.is_dynamic(same as usize) {
                 continue;
             }
-            // What opposing contacts may overlap together. Outside a squeeze only heavy bodies leave no room.
-            let room = if body == same && self.squeezed[body as usize] < 0.0 {
-                square_gyration(bodies, body).sqrt()
-            } else {
-                NO_ROOM * slop
-            };
             for pushing in group {
                 let (n, depth) = overlap(contacts, pushing);
                 let opposes = |other| {
                     let (m, other) = overlap(contacts, other);
-                    n.dot(m) < OPPOSED && depth + other > room
+                    n.dot(m) < OPPOSED && depth + other > NO_ROOM * slop
                 };
                 if depth <= slop || !group.iter().any(opposes) {
                     continue;
@@ -154,13 +136,6 @@ impl Jams {
             return;
         }
         self.forget_jams(contacts);
-        for contact in contacts.iter() {
-            for (by, of) in [(contact.body_a, contact.body_b), (contact.body_b, contact.body_a)] {
-                if let Some(k) = self.jam(of).filter(|_| self.squeezed[of as usize] < 0.0) {
-                    self.jammed[k].1 = self.jammed[k].1.max(surface_speed(bodies, contact, by));
-                }
-            }
-        }
         for (body, most) in &mut self.jammed {
             let (i, square) = (*body as usize, square_gyration(bodies, *body));
             let had = speed(bodies.velocity(i).to_array(), bodies.angular_velocity[i], square);
@@ -168,17 +143,12 @@ impl Jams {
         }
     }
 
-    /// Index in the list of bodies in a jam.
-    fn jam(&self, body: u32) -> Option<usize> {
-        self.jammed.binary_search_by_key(&body, |jammed| jammed.0).ok()
-    }
-
     /// Zeroes the impulses of bodies in a jam of a squeeze.
     fn forget_jams(&self, contacts: &mut [Contact]) {
         if self.jammed.is_empty() {
             return;
         }
-        let is_released = |body| self.jam(body).is_some() && self.squeezed[body as usize] >= 0.0;
+        let is_released = |body| self.jammed.binary_search_by_key(&body, |jammed| jammed.0).is_ok();
         for contact in contacts {
             if is_released(contact.body_a) || is_released(contact.body_b) {
                 forget(contact);
@@ -236,9 +206,9 @@ impl Jams {
         }
     }
 
-    /// Finds the squeezes, and lists the contacts of bodies in them, and deep ones of bodies that may be crushed.
+    /// Finds the squeezes, and lists the contacts of bodies in them.
     fn squeeze(&mut self, bodies: &Bodies, contacts: &[Contact]) {
-        if self.deep.is_empty() {
+        if self.deep.is_empty() || self.pressed.is_empty() {
             return;
         }
         let is_dynamic = |body: u32| bodies.is_dynamic(body as usize);
@@ -259,18 +229,6 @@ impl Jams {
                     }
                 }
             }
-        }
-        for k in 0..self.deep.len() {
-            let ([a, b], i, _) = self.deep[k];
-            for (own, other, is_own) in [(a, b, false), (b, a, true)] {
-                let is_crushed = HEAVY * bodies.inv_mass[other as usize] <= bodies.inv_mass[own as usize];
-                if self.squeezed[own as usize] < 0.0 && is_dynamic(own) && is_crushed {
-                    self.deep.push(([own; 2], i, is_own));
-                }
-            }
-        }
-        if self.pressed.is_empty() {
-            return;
         }
         for (i, contact) in contacts.iter().enumerate() {
             for (own, is_own) in [(contact.body_a, false), (contact.body_b, true)] {

@@ -189,7 +189,16 @@ where
             let old = record[layout.at(p, layout.normal_impulse)];
             let mass = record[layout.at(p, layout.normal_mass)];
             [begun.constant[p], begun.slope[p]] = if R::BY_MASS && unequal.any_positive() {
-                self.rule.line_by_mass(unequal, s, mass, old)
+                let weight = if N::FRICTION {
+                    let arm_n = arms::<L, N, O>(record, &layout, p, 0);
+                    let arm_t = arms::<L, N, O>(record, &layout, p, 1);
+                    let [of_a, of_b] = [0, 1].map(|k| state.inertia[k] * arm_n[k] * arm_t[k]);
+                    let coupling = (of_a + of_b).max(-(of_a + of_b));
+                    unequal.min(self.rule.most_weight(record[layout.friction] * mass * coupling))
+                } else {
+                    unequal
+                };
+                self.rule.line_by_mass(weight, s, mass, old)
             } else {
                 self.rule.line(!pushes_a, s, mass, old)
             };

@@ -96,6 +96,12 @@ pub trait NormalRule: Copy + Send + Sync + 'static {
         self.line(false, separation, mass, old)
     }
 
+    /// Largest weight for [`Self::line_by_mass`] of a point with q = µ |k_nt|/k_nn (1).
+    #[inline(always)]
+    fn most_weight<L: Lanes>(&self, _q: L) -> L {
+        L::splat(1.0)
+    }
+
     /// The slope s (kg) of a friction row, whose new impulse is λ − s v_t within the cone.
     #[inline(always)]
     fn tangent_slope<L: Lanes>(&self, mass: L) -> L {

@@ -33,6 +33,9 @@ pub(super) const CALM_TIME: f32 = 0.3;
 /// Fraction of its load at which the springs of a calm contact start to follow the load at once (1).
 const NEARLY: f32 = 0.99;
 
+/// Most that springs are shortened, as a fraction of a radius of gyration (1).
+const MOST: f32 = 0.25;
+
 /// Finds closed points, and starts from their loads.
 pub(in super::super) struct Close<'a> {
     /// Changes of velocity in free flight per substep. `[rows]`
@@ -139,7 +142,13 @@ fn close<L: Lanes>(
         let is_pair = if layout.points == 2 { record[layout.at(1, layout.normal_mass)] } else { zero };
         let at_once = is_pair.select_positive(is_short.select_positive(zero, at_once), zero);
         let borne = [borne_0, borne_1].map(|borne| at_once.select_positive(-one, borne));
-        store::<L, 1>(quads, index, segment.filled(batch, L::WIDTH), [calm, zero, borne[0], borne[1]]);
+        let size = |body: &[L; 8]| {
+            let [inv_mass, inv_inertia] = [body[3], body[7]];
+            let turns = inv_inertia.select_positive(inv_inertia, one);
+            inv_inertia.select_positive((inv_mass / turns).sqrt(), L::splat(f32::MAX))
+        };
+        let most = L::splat(MOST) * size(&a).min(size(&b));
+        store::<L, 1>(quads, index, segment.filled(batch, L::WIDTH), [calm, most, borne[0], borne[1]]);
     }
 }
 

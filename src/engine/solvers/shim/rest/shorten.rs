@@ -27,6 +27,20 @@
 //! Calm contacts whose preload is nearly their whole load follow at once, so leaning columns get the moment
 //! that they need. So do contacts found in the first step of one of their bodies.
 //!
+//! # Crushed bodies
+//!
+//! A contact is a spring along a fixed normal only while its bodies turn little. One shortened by δ moves the body by
+//! up to δ when its load goes, and turns it by up to δ/ρ, with ρ its radius of gyration. So no spring is shortened
+//! by more than ρ/4 of either body:
+//!
+//! ```text
+//! F ≤ k ρ/4,      k = m ω²
+//! ```
+//!
+//! A body of mass m on which a mass M rests reaches this bound at M/m = ω² ρ/4g, 2000 for a body of 10 cm at 134 Hz.
+//! It then sinks as it would without preload. Without the bound the impulses F h of a box of 0.05 kg under one of 320 kg
+//! threw it out at 104 m/s as soon as its normals turned, and a capsule under 3·10⁶ kg was spun at 10⁵ rad/s.
+//!
 //! # Contacts that roll
 //!
 //! Shortening a spring moves bodies apart, and bodies that touch at one point then roll. In a pile of discs
@@ -106,7 +120,7 @@ fn shorten<L: Lanes>(
             prefetch_quad::<2, 0>(quads, coming);
         }
         let loads: [L; 4] = L::gather_quads::<2, 0>(quads, index);
-        let [calm, _, borne_0, borne_1]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
+        let [calm, most, borne_0, borne_1]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
         let mut borne = [borne_0, borne_1];
         let is_single = if layout.points == 2 {
             record[layout.at(1, layout.normal_mass)].select_positive(zero, one)
@@ -136,6 +150,7 @@ fn shorten<L: Lanes>(
             } else {
                 borne[p] = load;
             }
+            borne[p] = borne[p].min(most * mass / compliance);
             let sag = compliance * borne[p] / mass;
             // A rise is already in the impulse: the spring has deflected under it.
             let known = (before + L::splat(0.5)).select_positive(borne[p].min(before), borne[p]);
@@ -149,6 +164,6 @@ fn shorten<L: Lanes>(
             }
         }
         let filled = segment.filled(batch, L::WIDTH);
-        super::closed::store::<L, 1>(quads, index, filled, [calm, zero, borne[0], borne[1]]);
+        super::closed::store::<L, 1>(quads, index, filled, [calm, most, borne[0], borne[1]]);
     }
 }

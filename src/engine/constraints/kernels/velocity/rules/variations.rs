@@ -41,6 +41,18 @@ impl<R: NormalRule> NormalRule for Turned<R> {
 }
 
 /// Over- or under-relaxation of another rule's line c − s v: λ + ω (c − s v − λ).
+///
+/// # Bound of ω
+///
+/// The friction of a sliding point follows its normal impulse, T = ±µ N. So a change of N by ω (v − v_n)/k_nn changes v_n by
+///
+/// ```text
+/// ω (1 ± q) (v − v_n),      q = µ |k_nt|/k_nn
+/// ```
+///
+/// and rows that oppose each other diverge if ω (1 + q) > 2. A small body that was jammed between two large ones left at 200 m/s
+/// with ω = 1.4. [`Between`] uses ω = 1 + (ω₁ − 1) w, so w ≤ (1 − q)/((1 + q) (ω₁ − 1)) keeps ω (1 + q) ≤ 2 up to q = 1.
+/// The bottom corners of a square have q = 0.6 µ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relaxed<R> {
     /// The other rule.
@@ -62,6 +74,12 @@ impl<R: NormalRule> NormalRule for Relaxed<R> {
         let [constant, slope] = self.rule.line(against_static, separation, mass, old);
         let factor = L::splat(self.factor);
         [factor.mul_add(constant - old, old), factor * slope]
+    }
+
+    #[inline(always)]
+    fn most_weight<L: Lanes>(&self, q: L) -> L {
+        let one = L::splat(1.0);
+        ((one - q) / ((one + q) * L::splat(self.factor - 1.0))).max(L::zero())
     }
 
     #[inline(always)]
@@ -109,6 +127,11 @@ impl<R: NormalRule, S: NormalRule> NormalRule for Between<R, S> {
         let equal = self.equal.line(false, separation, mass, old);
         let unequal = self.unequal.line(false, separation, mass, old);
         [0, 1].map(|k| weight.mul_add(unequal[k] - equal[k], equal[k]))
+    }
+
+    #[inline(always)]
+    fn most_weight<L: Lanes>(&self, q: L) -> L {
+        self.unequal.most_weight(q)
     }
 
     #[inline(always)]
