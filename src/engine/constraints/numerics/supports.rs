@@ -60,7 +60,7 @@ pub(crate) fn load(supports: &mut [Support], force: DVec2, torque: f64, gyration
     let outer = |c: DVec3| DMat3::from_cols(c * c.x, c * c.y, c * c.z);
     let all = -DVec3::new(force.x, force.y, if gyration > 0.0 { torque / gyration } else { 0.0 });
     supports.iter_mut().for_each(|support| support.load = [1.0, 0.0]);
-    for is_last in [false, true] {
+    for _ in 0..2 {
         let most = supports.iter().map(|s| s.load[0]).fold(0.0, f64::max);
         let mut matrix = DMat3::from_diagonal(DVec3::splat(RIDGE));
         for support in supports.iter().filter(|s| s.load[0] > 0.0) {
@@ -74,7 +74,7 @@ pub(crate) fn load(supports: &mut [Support], force: DVec2, torque: f64, gyration
             let normal = column(support, support.normal).dot(solution).max(0.0);
             let tangent = support.load[0] / most * column(support, support.tangent()).dot(solution);
             let bound = support.friction * normal;
-            support.load = [normal, if is_last { tangent.max(-bound).min(bound) } else { 0.0 }];
+            support.load = [normal, tangent.max(-bound).min(bound)];
         }
     }
     let total: DVec2 = supports.iter().map(Support::force).sum();

@@ -453,7 +453,7 @@ impl Spread {
                 self.queue.push_back(row);
             }
         }
-        point.push(on.rows, &mut self.bodies, impulse, if on.timed { at } else { 0.0 });
+        point.push(on.rows, impulse, if on.timed { at } else { 0.0 });
     }
 
     /// Links the ends of each body, and joins bodies in contact into islands.

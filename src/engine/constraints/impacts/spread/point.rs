@@ -18,13 +18,10 @@ pub(super) struct Body {
     /// Time of the last push (s); −∞ without one.
     pub time: f32,
     pub is_queued: bool,
-    /// Rounding error of its velocity, added with the next push (m/s, m/s, rad/s): pushes can be very many.
-    pub rounded: [f32; 3],
 }
 
 /// A body that nothing has pushed.
-pub(super) const STILL: Body =
-    Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false, rounded: [0.0; 3] };
+pub(super) const STILL: Body = Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false };
 
 /// Role of a point in a wave.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -268,19 +265,13 @@ impl HitPoint {
     }
 
     /// Applies impulses `[n, t]` (N·s) to both bodies, at `time` (s).
-    pub fn push(&self, rows: &mut [BodyRow], bodies: &mut [Body], [n, t]: [f32; 2], time: f32) {
+    pub fn push(&self, rows: &mut [BodyRow], [n, t]: [f32; 2], time: f32) {
         let [nx, ny] = self.normal;
         let (x, y) = (nx.mul_add(n, ny * t), ny.mul_add(n, -(nx * t)));
         for (side, sign) in [(1, 1.0), (0, -1.0)] {
             if side == 1 || self.pushes_a {
-                let (place, [arm_n, arm_t]) = (self.rows[side] as usize, self.arms[side]);
-                give(
-                    &mut rows[place],
-                    &mut bodies[place].rounded,
-                    sign,
-                    [x, y, arm_n.mul_add(n, arm_t * t)],
-                    time,
-                );
+                let [arm_n, arm_t] = self.arms[side];
+                give(&mut rows[self.rows[side] as usize], sign, [x, y, arm_n.mul_add(n, arm_t * t)], time);
             }
         }
     }
@@ -319,12 +310,10 @@ impl HitPoint {
 
 /// Gives `sign` times an impulse (N·s, N·s, N·m·s) to a body at `time` (s).
 #[inline(always)]
-fn give(row: &mut BodyRow, rounded: &mut [f32; 3], sign: f32, [x, y, turn]: [f32; 3], time: f32) {
+fn give(row: &mut BodyRow, sign: f32, [x, y, turn]: [f32; 3], time: f32) {
     let (mass, inertia) = (sign * row.velocity[3], sign * row.delta[3]);
     for (k, gained) in [mass * x, mass * y, inertia * turn].into_iter().enumerate() {
         row.delta[k] = time.neg_mul_add(gained, row.delta[k]);
-        let (before, gained) = (row.velocity[k], gained + rounded[k]);
-        row.velocity[k] = before + gained;
-        rounded[k] = gained - (row.velocity[k] - before);
+        row.velocity[k] += gained;
     }
 }
