@@ -189,7 +189,7 @@ where
             let old = record[layout.at(p, layout.normal_impulse)];
             let mass = record[layout.at(p, layout.normal_mass)];
             [begun.constant[p], begun.slope[p]] = if R::BY_MASS && unequal.any_positive() {
-                let weight = if N::FRICTION {
+                let weight = if has_friction {
                     let arm_n = arms::<L, N, O>(record, &layout, p, 0);
                     let arm_t = arms::<L, N, O>(record, &layout, p, 1);
                     let [of_a, of_b] = [0, 1].map(|k| state.inertia[k] * arm_n[k] * arm_t[k]);

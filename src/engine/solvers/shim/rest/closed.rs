@@ -33,8 +33,8 @@ pub(super) const CALM_TIME: f32 = 0.3;
 /// Fraction of its load at which the springs of a calm contact start to follow the load at once (1).
 const NEARLY: f32 = 0.99;
 
-/// Most that springs are shortened, as a fraction of a radius of gyration (1).
-const MOST: f32 = 0.25;
+/// Largest shortening of a spring, as a fraction of a radius of gyration (1); see [`super::shorten`].
+const BY_SIZE: f32 = 0.25;
 
 /// Finds closed points, and starts from their loads.
 pub(in super::super) struct Close<'a> {
@@ -147,7 +147,7 @@ fn close<L: Lanes>(
             let turns = inv_inertia.select_positive(inv_inertia, one);
             inv_inertia.select_positive((inv_mass / turns).sqrt(), L::splat(f32::MAX))
         };
-        let most = L::splat(MOST) * size(&a).min(size(&b));
+        let most = L::splat(BY_SIZE) * size(&a).min(size(&b));
         store::<L, 1>(quads, index, segment.filled(batch, L::WIDTH), [calm, most, borne[0], borne[1]]);
     }
 }

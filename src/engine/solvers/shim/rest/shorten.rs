@@ -37,7 +37,7 @@
 //! F ≤ k ρ/4,      k = m ω²
 //! ```
 //!
-//! A body of mass m on which a mass M rests reaches this bound at M/m = ω² ρ/4g, 2000 for a body of 10 cm at 134 Hz.
+//! A body of mass m on which a mass M rests reaches this bound at M/m = ω² ρ/4g, 1800 with ρ = 10 cm at 134 Hz.
 //! It then sinks as it would without preload. Without the bound the impulses F h of a box of 0.05 kg under one of 320 kg
 //! threw it out at 104 m/s as soon as its normals turned, and a capsule under 3·10⁶ kg was spun at 10⁵ rad/s.
 //!
