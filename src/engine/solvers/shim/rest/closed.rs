@@ -33,8 +33,8 @@ pub(super) const CALM_TIME: f32 = 0.3;
 /// Fraction of its load at which the springs of a calm contact start to follow the load at once (1).
 const NEARLY: f32 = 0.99;
 
-/// Largest shortening of a spring, as a fraction of a radius of gyration (1); see [`super::shorten`].
-const BY_SIZE: f32 = 0.25;
+/// Largest preload ÷ (mass × radius of gyration ÷ dt²) (1); see [`super::shorten`].
+const MOST: f32 = 50.0;
 
 /// Finds closed points, and starts from their loads.
 pub(in super::super) struct Close<'a> {
@@ -145,9 +145,9 @@ fn close<L: Lanes>(
         let size = |body: &[L; 8]| {
             let [inv_mass, inv_inertia] = [body[3], body[7]];
             let turns = inv_inertia.select_positive(inv_inertia, one);
-            inv_inertia.select_positive((inv_mass / turns).sqrt(), L::splat(f32::MAX))
+            inv_inertia.select_positive((inv_mass / turns).sqrt(), L::splat(1e30))
         };
-        let most = L::splat(BY_SIZE) * size(&a).min(size(&b));
+        let most = L::splat(MOST / (dt * dt)) * size(&a).min(size(&b));
         store::<L, 1>(quads, index, segment.filled(batch, L::WIDTH), [calm, most, borne[0], borne[1]]);
     }
 }

@@ -46,7 +46,7 @@ use crate::engine::constraints::{Passes, Workspace};
 use crate::engine::lanes::BodyRow;
 
 /// Numbers kept per contact, two quads: N and T of both points (N), −1 and 0 for a point that is open; how long the contact has been
-/// calm (s); how far springs may be shortened (m); and the load that those of each point are shortened for (N), −1 for a contact that is calm.
+/// calm (s); the largest preload per effective mass (m/s²); and the load that springs of each point are shortened for (N), −1 for a contact that is calm.
 pub(super) const PER_CONTACT: usize = 8;
 
 /// See [`PER_CONTACT`].
