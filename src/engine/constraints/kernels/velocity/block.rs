@@ -188,9 +188,9 @@ where
             let s = separation::<L, N, O>(record, p, moved, [sine_a, sine_b], [versine_a, versine_b]);
             let old = record[layout.at(p, layout.normal_impulse)];
             let mass = record[layout.at(p, layout.normal_mass)];
+            let arm_n = arms::<L, N, O>(record, &layout, p, 0);
             [begun.constant[p], begun.slope[p]] = if R::BY_MASS && unequal.any_positive() {
                 let weight = if has_friction {
-                    let arm_n = arms::<L, N, O>(record, &layout, p, 0);
                     let arm_t = arms::<L, N, O>(record, &layout, p, 1);
                     let [of_a, of_b] = [0, 1].map(|k| state.inertia[k] * arm_n[k] * arm_t[k]);
                     let coupling = (of_a + of_b).max(-(of_a + of_b));
@@ -202,7 +202,6 @@ where
             } else {
                 self.rule.line(!pushes_a, s, mass, old)
             };
-            let arm_n = arms::<L, N, O>(record, &layout, p, 0);
             begun.velocity[p] = with_arms::<L, N, O>(along_n, state.w, arm_n);
             if has_friction && NORMAL_FIRST {
                 let arm_t = arms::<L, N, O>(record, &layout, p, 1);
