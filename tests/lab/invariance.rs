@@ -244,13 +244,24 @@ const TOLERANCE: f64 = 1e-2;
 /// Scenes per comparison.
 const SCENES: u32 = 24;
 
-/// Number of the [`SCENES`] scenes that deviate from their image by more than [`TOLERANCE`].
-fn parted(symmetry: &Symmetry, variant: &'static Variant) -> u32 {
+/// Number of `scenes` scenes that deviate from their image by more than [`TOLERANCE`].
+fn parted(symmetry: &Symmetry, variant: &'static Variant, scenes: u32) -> u32 {
     let apart = |&n: &u32| {
-        let u = (f64::from(n) + 0.5) / f64::from(SCENES);
+        let u = (f64::from(n) + 0.5) / f64::from(scenes);
         deviation(symmetry, variant, &scene(n), u) > TOLERANCE
     };
-    (0..SCENES).filter(apart).count() as u32
+    (0..scenes).filter(apart).count() as u32
+}
+
+/// The table of papers/shim.md. A sample of [`SCENES`] is too small for what occurs once in a hundred scenes.
+#[test]
+#[ignore = "half a minute; prints a table and checks nothing"]
+fn symmetries_of_720_scenes() {
+    for name in ["shim", "soft_step", "box2d", "rapier"] {
+        let variant = simpulse::engine::solvers::find(name).unwrap();
+        let counts = SYMMETRIES.iter().map(|s| format!(" {}={}", s.name, parted(s, variant, 720)));
+        println!("{name}:{}", counts.collect::<String>());
+    }
 }
 
 /// A power of two causes no rounding. So a scaled scene moves to the same bits if its length unit is scaled
@@ -296,7 +307,7 @@ fn every_symmetry_holds_or_is_known_not_to() {
     let head: String = known.lines().filter(|l| l.starts_with('#')).map(|l| format!("{l}\n")).collect();
     let mut found = head;
     for variant in &VARIANTS {
-        let counts = SYMMETRIES.iter().map(|s| format!(" {}={}", s.name, parted(s, variant)));
+        let counts = SYMMETRIES.iter().map(|s| format!(" {}={}", s.name, parted(s, variant, SCENES)));
         found += &format!("{}:{}\n", variant.name, counts.collect::<String>());
     }
     if std::env::var_os("SIMPULSE_BLESS").is_some() {

@@ -109,7 +109,7 @@ mod part {
     pub const MOMENT: usize = 6;
     pub const RELEASE: usize = 7;
     pub const JAMS: usize = 8;
-    pub const HELD: usize = 9;
+    pub const ONCE: usize = 9;
     pub const CHAINS: usize = 10;
     pub const UNEQUAL: usize = 11;
 }
@@ -180,8 +180,8 @@ const MECHANISMS: [Mechanism; 12] = [
         lines: lines_of(include_str!("shim/jams.rs")),
     },
     Mechanism {
-        name: "held",
-        meaning: "contacts of one point keep what they are shortened by, within bounds",
+        name: "once",
+        meaning: "contacts of one point are shortened once, as soon as nothing moves",
         case: "rest::a_pile_of_discs_hardly_breathes",
         lines: 0,
     },

@@ -65,8 +65,8 @@ impl Shim {
     /// Finds the loads of closed contacts and shortens `springs` by their sag.
     pub(super) fn rest(&mut self, passes: &mut Passes<'_>, springs: Soft, load_sweeps: u32) {
         let (h, dt, length_unit) = (passes.h(), passes.dt(), passes.length_unit());
-        let [hands_down, rises, holds] =
-            [part::HAND_DOWN, part::RISING, part::HELD].map(|part| passes.has(part));
+        let [hands_down, rises, once] =
+            [part::HAND_DOWN, part::RISING, part::ONCE].map(|part| passes.has(part));
         let fields = &mut self.fields;
         let StepParts { work, .. } = passes.parts();
         fields.clear();
@@ -90,6 +90,6 @@ impl Shim {
         for _ in 0..load_sweeps {
             passes.over_contacts(&mut loads::LoadSweep { fields, h });
         }
-        passes.over_contacts(&mut shorten::Shorten { springs, h, dt, rises, holds });
+        passes.over_contacts(&mut shorten::Shorten { springs, h, dt, rises, once });
     }
 }

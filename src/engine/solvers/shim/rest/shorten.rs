@@ -45,8 +45,8 @@
 //! # Contacts that roll
 //!
 //! Shortening a spring moves bodies apart, and bodies that touch at one point then roll. In a pile of discs
-//! some contact slips, loads change, and the pile swells and settles forever. So a contact of one point keeps
-//! its preload while that is between half and 1.1 times its load.
+//! some contact slips, loads change, and the pile swells and settles forever. So a contact of one point is
+//! shortened for its load once, when it is calm for the first time. After that its preload only falls.
 
 use super::closed::CALM_TIME;
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
@@ -66,15 +66,12 @@ pub(in super::super) struct Shorten {
     pub dt: f32,
     /// Preloads rise slowly, and only at calm contacts.
     pub rises: bool,
-    /// Contacts of one point keep their preload within bounds.
-    pub holds: bool,
+    /// Contacts of one point are shortened once.
+    pub once: bool,
 }
 
-/// Smallest preload that a contact of one point keeps, as a fraction of its load (1).
-const LEAST: f32 = 0.5;
-
-/// Largest such preload, as a multiple of the load (1); see [`LEAST`].
-const MOST: f32 = 1.1;
+/// Preload of a point that has borne more and now bears nothing (N): it is not that of a new contact, zero.
+const LEAST: f32 = f32::MIN_POSITIVE;
 
 /// τ: time constant of rising preloads at calm contacts (s).
 const RISE: f32 = 3.0;
@@ -101,7 +98,7 @@ fn shorten<L: Lanes>(
     segment: &Segment,
     layout: &Layout,
     kept: &mut [f32],
-    &Shorten { springs, h, dt, rises, holds }: &Shorten,
+    &Shorten { springs, h, dt, rises, once }: &Shorten,
 ) {
     let Softness { bias_rate, mass_scale, impulse_scale } = match segment.opposite {
         OppositeKind::Dynamic => springs.dynamic,
@@ -128,9 +125,12 @@ fn shorten<L: Lanes>(
         } else {
             one
         };
-        let grows = (calm - L::splat(CALM_TIME)).select_positive(grows, zero);
+        let [grows, whole] =
+            [grows, one].map(|part| (calm - L::splat(CALM_TIME)).select_positive(part, zero));
         let risen = |borne: L, load: L, spring: L| {
             let rise = (load.min(spring) - borne).max(zero);
+            let is_single = if once { is_single } else { zero };
+            let grows = is_single.select_positive(borne.select_positive(zero, whole), grows);
             let grown = grows.mul_add(rise, borne).min(load);
             (borne + L::splat(0.5)).select_positive(grown, load)
         };
@@ -142,16 +142,8 @@ fn shorten<L: Lanes>(
             // The preload has been subtracted from the impulse.
             let at = layout.at(p, layout.normal_impulse);
             let spring = record[at].mul_add(per_substep, before.max(zero));
-            if holds && p == 0 && is_single.any_positive() {
-                let kept = borne[0].max(L::splat(LEAST) * load).min(L::splat(MOST) * load);
-                let kept = borne[0].select_positive(kept, load);
-                borne[0] = is_single.select_positive(kept, risen(borne[0], load, spring));
-            } else if rises {
-                borne[p] = risen(borne[p], load, spring);
-            } else {
-                borne[p] = load;
-            }
-            borne[p] = borne[p].min(most * mass);
+            let risen = if rises { risen(before, load, spring) } else { load };
+            borne[p] = risen.min(most * mass).max(before.min(L::splat(LEAST)));
             let sag = compliance * borne[p] / mass;
             // A rise is already in the impulse: the spring has deflected under it.
             let known = (before + L::splat(0.5)).select_positive(borne[p].min(before), borne[p]);
