@@ -19,6 +19,7 @@ pub mod model;
 mod picture;
 mod schedules;
 pub mod table;
+mod vectors;
 
 use crate::engine::constraints::records::kept::KeptSize;
 use crate::engine::params::{Budget, Without};

@@ -6,11 +6,10 @@ use super::model::{Model, RowOrder, ScalarRule, ScalarSpring, ScalarSweep};
 use crate::engine::params::Budget;
 use crate::engine::solvers::{Variant, xpbd as positions};
 use crate::lab::reference::DPair;
-use crate::lab::reference::residual::project_cone;
 
 /// Uncorrected overlap (m), push speed limit (m/s), largest correction of a position sweep (m).
 const SLOP: f64 = 0.005;
-const CAP: f64 = 3.0;
+pub(super) const CAP: f64 = 3.0;
 const MOST: f64 = 0.2;
 
 /// Parameters of a schedule.
@@ -31,16 +30,16 @@ impl Run {
     }
 
     /// The same; zero if the solver has no such parameter.
-    fn get(&self, name: &str) -> f64 {
+    pub(super) fn get(&self, name: &str) -> f64 {
         self.find(name).unwrap_or(0.0)
     }
 
     /// Whether departure `place` is undone.
-    fn undoes(&self, place: usize) -> bool {
+    pub(super) fn undoes(&self, place: usize) -> bool {
         self.undo == Some(place)
     }
 
-    fn baumgarte(&self) -> ScalarRule {
+    pub(super) fn baumgarte(&self) -> ScalarRule {
         ScalarRule::Baumgarte(self.get("baumgarte"), SLOP, CAP)
     }
 
@@ -589,193 +588,6 @@ fn solve3(a: [[f64; 3]; 3], f: [f64; 3]) -> [f64; 3] {
         (0..3).for_each(|r| m[r][column] = f[r]);
         det(m) / det(a)
     })
-}
-
-fn dot(a: &[DPair], b: &[DPair]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a[0] * b[0] + a[1] * b[1]).sum()
-}
-
-/// a + s b
-fn plus(a: &[DPair], s: f64, b: &[DPair]) -> Vec<DPair> {
-    a.iter().zip(b).map(|(a, b)| [a[0] + s * b[0], a[1] + s * b[1]]).collect()
-}
-
-pub(super) fn nncg(model: &mut Model, run: &Run) {
-    let sweep = ScalarSweep::new(run.baumgarte());
-    let count = run.budget.velocity_iterations;
-    model.accelerate();
-    model.warm_start(false);
-    let (mut p, mut previous) = (vec![[0.0; 2]; model.l.len()], f64::INFINITY);
-    for k in 0..count {
-        let before = model.l.clone();
-        model.sweep(&sweep);
-        if k + 1 == count && !run.undoes(0) {
-            break;
-        }
-        let r = plus(&model.l, -1.0, &before);
-        let square = dot(&r, &r);
-        let beta = if square <= previous && square > 0.0 { square / previous } else { 0.0 };
-        previous = square;
-        model.jump(&plus(&model.l, beta, &p));
-        p = plus(&r, beta, &p);
-    }
-    model.advance();
-}
-
-pub(super) fn anderson(model: &mut Model, run: &Run) {
-    let sweep = ScalarSweep::new(run.baumgarte());
-    let (count, depth) = (run.budget.velocity_iterations, run.get("depth") as usize);
-    model.accelerate();
-    model.warm_start(false);
-    // f and g of the sweeps since the last restart.
-    let mut seen: Vec<[Vec<DPair>; 2]> = Vec::new();
-    for k in 0..count {
-        let before = model.l.clone();
-        model.sweep(&sweep);
-        if k + 1 == count {
-            break;
-        }
-        let (f, g) = (plus(&model.l, -1.0, &before), model.l.clone());
-        if seen.last().is_some_and(|[last, _]| dot(&f, &f) > 4.0 * dot(last, last)) && !run.undoes(0) {
-            seen.clear();
-        }
-        seen.push([f, g]);
-        let difference = |at: usize, of: usize| plus(&seen[at][of], -1.0, &seen[at - 1][of]);
-        let columns: Vec<usize> = (1..seen.len()).rev().take(depth).collect();
-        let [df, dg] = [0, 1].map(|of| columns.iter().map(|&at| difference(at, of)).collect::<Vec<_>>());
-        let [f, g] = &seen[seen.len() - 1];
-        let mut gram: Vec<Vec<f64>> = df.iter().map(|a| df.iter().map(|b| dot(a, b)).collect()).collect();
-        let trace: f64 = (0..df.len()).map(|i| gram[i][i]).sum();
-        (0..df.len()).for_each(|i| gram[i][i] += 1e-9 * trace);
-        let gamma = solve(gram, df.iter().map(|a| dot(a, f)).collect());
-        let next = gamma.iter().zip(&dg).fold(g.clone(), |next, (gamma, dg)| plus(&next, -gamma, dg));
-        model.jump(&next);
-    }
-    model.advance();
-}
-
-/// A x = b by Gaussian elimination.
-fn solve(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
-    let n = b.len();
-    for i in 0..n {
-        let pivot = (i..n).max_by(|&p, &q| a[p][i].abs().total_cmp(&a[q][i].abs())).unwrap_or(i);
-        a.swap(i, pivot);
-        b.swap(i, pivot);
-        for r in (i + 1)..n {
-            let factor = a[r][i] / a[i][i];
-            (i..n).for_each(|c| a[r][c] -= factor * a[i][c]);
-            b[r] -= factor * b[i];
-        }
-    }
-    for i in (0..n).rev() {
-        let known: f64 = (i + 1..n).map(|c| a[i][c] * b[c]).sum();
-        b[i] = (b[i] - known) / a[i][i];
-    }
-    b
-}
-
-/// u = J v(λ) + b, and the effective masses of normal rows.
-struct VectorLaw {
-    bias: Vec<f64>,
-    mass: Vec<f64>,
-    friction: Vec<f64>,
-}
-
-impl VectorLaw {
-    fn new(model: &Model, rule: ScalarRule) -> Self {
-        let friction = model.problem.contacts.iter().map(|c| c.friction).collect();
-        let mass = (0..model.l.len()).map(|i| model.mass(&model.rows(i, false), 0)).collect();
-        VectorLaw { bias: model.bias(rule), mass, friction }
-    }
-
-    fn speeds(&self, model: &mut Model, at: &[DPair]) -> Vec<DPair> {
-        model.jump(at);
-        model.speeds().into_iter().zip(&self.bias).map(|(u, b)| [u[0] + b, u[1]]).collect()
-    }
-
-    fn project(&self, l: &[DPair]) -> Vec<DPair> {
-        l.iter().zip(&self.friction).map(|(&l, &mu)| project_cone(mu, l)).collect()
-    }
-
-    /// Every pair, scaled by a function of its effective mass.
-    fn scaled(&self, l: &[DPair], by: impl Fn(f64) -> f64) -> Vec<DPair> {
-        l.iter().zip(&self.mass).map(|(l, &m)| l.map(|l| by(m) * l)).collect()
-    }
-}
-
-pub(super) fn apgd(model: &mut Model, run: &Run) {
-    model.accelerate();
-    model.warm_start(false);
-    let mut law = VectorLaw::new(model, run.baumgarte());
-    let (mut theta, mut steepness, mut now) = (1.0_f64, 1.0, model.l.clone());
-    if run.undoes(0) {
-        law.mass.fill(1.0);
-        let ones = vec![[1.0; 2]; now.len()];
-        steepness = dot(&model.problem.delassus_product(&ones), &model.problem.delassus_product(&ones))
-            .sqrt()
-            / dot(&ones, &ones).sqrt();
-    }
-    let mut y = now.clone();
-    for _ in 0..run.budget.velocity_iterations {
-        let g = law.speeds(model, &y);
-        let mut next;
-        let mut tries = 0;
-        loop {
-            next = law.project(&plus(&y, -1.0 / steepness, &law.scaled(&g, |m| m)));
-            let step = plus(&next, -1.0, &y);
-            let curve = dot(&step, &plus(&law.speeds(model, &next), -1.0, &g));
-            tries += 1;
-            if curve <= steepness * dot(&step, &law.scaled(&step, |m| 1.0 / m)) * (1.0 + 1e-5) || tries == 20
-            {
-                break;
-            }
-            steepness *= 2.0;
-        }
-        let square = theta * theta;
-        let after = 0.5 * ((square * square + 4.0 * square).sqrt() - square);
-        let mut beta = theta * (1.0 - theta) / (square + after);
-        theta = after;
-        if dot(&g, &plus(&next, -1.0, &now)) > 0.0 {
-            (beta, theta) = (0.0, 1.0);
-        }
-        y = plus(&next, beta, &plus(&next, -1.0, &now));
-        now = next;
-        steepness *= 0.9;
-    }
-    model.jump(&now);
-    model.advance();
-}
-
-/// The solution of the convex relaxation of soft contacts: the minimum of ½ γᵀ (J M⁻¹ Jᵀ + R) γ +
-/// γᵀ (J v − v̂) within the cones, found point by point.
-pub(super) fn sap(model: &mut Model, run: &Run) {
-    model.accelerate();
-    model.warm_start(false);
-    let push = model.bias(ScalarRule::Baumgarte(run.get("baumgarte"), 0.0, CAP));
-    for i in (0..5000).flat_map(|_| 0..push.len()) {
-        let (rows, l, mu) = (model.rows(i, false), model.l[i], model.problem.contacts[i].friction);
-        let k = |a, b| model.coupling((&rows, a), (&rows, b));
-        let (nn, nt, tt, gives) = (k(0, 0), k(0, 1), k(1, 1), 1.0 + run.get("softness"));
-        // J v − v̂ without γ of this point, and J M⁻¹ Jᵀ + R.
-        let n = model.speed(&rows, 0) + push[i] - nn * l[0] - nt * l[1];
-        let t = model.speed(&rows, 1) - nt * l[0] - tt * l[1];
-        let (a, b) = (gives * nn, gives * tt);
-        let stick = [nt * t - b * n, nt * n - a * t].map(|x| x / (a * b - nt * nt));
-        let edge = |side: f64| {
-            let least = -(n + side * mu * t) / (a + 2.0 * side * mu * nt + mu * mu * b);
-            [least.max(0.0), side * mu * least.max(0.0)]
-        };
-        let energy =
-            |g: DPair| 0.5 * (a * g[0] * g[0] + b * g[1] * g[1]) + nt * g[0] * g[1] + n * g[0] + t * g[1];
-        let (one, other) = (edge(1.0), edge(-1.0));
-        let new = match () {
-            () if stick[1].abs() <= mu * stick[0] => stick,
-            () if energy(one) < energy(other) => one,
-            () => other,
-        };
-        (0..2).for_each(|axis| model.set(i, axis, &rows, new[axis]));
-    }
-    model.advance();
 }
 
 /// The solution of the law of [`pgs`], to which Gauss–Seidel converges.

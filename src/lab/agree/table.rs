@@ -2,6 +2,7 @@
 
 use super::model::Model;
 use super::schedules::{self as by, Run};
+use super::vectors;
 
 /// The reference of a comparison.
 #[derive(Clone, Copy, Debug)]
@@ -111,21 +112,25 @@ pub const TABLE: &[AgreementEntry] = &[
     entry("nsgs", Against::Method(by::nsgs), "local solver exact, until a residual is reached"),
     AgreementEntry {
         departs: &["the last iteration is a plain sweep (source: goes on beyond it)"],
-        ..entry("nncg", Against::Method(by::nncg), "until a residual is reached")
+        ..entry("nncg", Against::Method(vectors::nncg), "until a residual is reached")
     },
     AgreementEntry {
         departs: &["growth of |f| by two forgets all before it (source: keeps it)"],
-        ..entry("anderson", Against::Method(by::anderson), "until a residual is reached, depth by problem")
+        ..entry(
+            "anderson",
+            Against::Method(vectors::anderson),
+            "until a residual is reached, depth by problem",
+        )
     },
     AgreementEntry {
         departs: &["steps scaled by effective masses, L from 1 (source: no scale, L₀ = |K 1|/|1|)"],
-        ..entry("apgd", Against::Method(by::apgd), "50 iterations (Chrono), until a residual is reached")
+        ..entry("apgd", Against::Method(vectors::apgd), "50 iterations (Chrono), until a residual is reached")
     },
     AgreementEntry {
         why: "its method ends at the solution of the convex relaxation",
         ..entry(
             "barzilai_borwein",
-            Against::Solution(by::apgd),
+            Against::Solution(vectors::apgd),
             "until a residual is reached, 10 values remembered",
         )
     },
@@ -145,7 +150,7 @@ pub const TABLE: &[AgreementEntry] = &[
         why: "Newton's method ends at the solution of its law",
         ..entry(
             "sap",
-            Against::Solution(by::sap),
+            Against::Solution(vectors::sap),
             "until the gradient is small, σ 10⁻³, τ by problem (Drake)",
         )
     },

@@ -5,6 +5,7 @@
 //! velocity sweeps in any order, Jacobi sweeps, split masses, position sweeps.
 
 pub mod chains;
+pub(crate) mod passes;
 pub mod rows;
 
 use crate::engine::bodies::Bodies;
@@ -17,10 +18,11 @@ use crate::engine::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, MOST_LAN
 use crate::engine::narrowphase::lanes::PoseRow;
 use chains::records::Linked;
 use glam::Vec2;
-use rows::{
-    Blocks, Collected, DisplacementRule, Displacements, JointPair, JointPass, JointWarmStart, Places,
-    RigidFinder, RowBlock, Vectors, Velocities, VelocityRule,
+use passes::{
+    Blocks, Collected, DisplacementRule, Displacements, JointWarmStart, Places, RigidFinder, Vectors,
+    Velocities, VelocityRule,
 };
+use rows::{JointPair, JointPass, RowBlock};
 use std::f32::consts::TAU;
 use std::fmt;
 use std::ops::DerefMut;

@@ -1,6 +1,7 @@
 //! Links of one type of joint: their data during a step, and their rows.
 
-use crate::engine::constraints::joints::rows::{Besides, Jacobian, JointPair, JointPass, RowLaw};
+use crate::engine::constraints::joints::passes::Besides;
+use crate::engine::constraints::joints::rows::{Jacobian, JointPair, JointPass, RowLaw};
 use crate::engine::constraints::joints::{ANCHORS, JointType, Joints, placed_anchors, write_velocities};
 use crate::engine::constraints::kernels::frame::{INV_INERTIA, INV_MASS};
 use crate::engine::constraints::kernels::types::{ConstraintType, TypeInput};
