@@ -1,6 +1,6 @@
 //! Broad phase: finds pairs of shapes whose bounds overlap.
 //!
-//! Every kind gives the same sorted list, so the choice affects only the time. [`all_pairs`] is the
+//! Every kind gives the same sorted list, so the choice affects only the time. [`all_pairs()`] is the
 //! definition, [`HashGrid`] keeps no state, and [`Tree`] keeps its order and its list. [`FatBoxes`] determine
 //! which shapes need a search; a step in which no shape has left its fat box searches nothing. Nanoseconds
 //! per proxy (Zen 5, 16 lanes) for scenes in motion, with the fraction of proxies that left their fat boxes:
@@ -83,7 +83,7 @@ pub enum BroadPhaseKind {
     /// [`Tree`]
     #[default]
     Tree,
-    /// [`all_pairs`]
+    /// [`all_pairs()`]
     AllPairs,
 }
 
@@ -100,7 +100,7 @@ pub enum BroadPhase {
     HashGrid(HashGrid),
     /// See [`Tree`].
     Tree(Tree),
-    /// See [`all_pairs`].
+    /// See [`all_pairs()`].
     AllPairs,
 }
 

@@ -1,4 +1,4 @@
-//! Passes between contact records and [`PointVector`]s: impulses in and out, J v, and M⁻¹ Jᵀ.
+//! Passes between contact records and [`PointVector`](crate::engine::constraints::PointVector)s: impulses in and out, J v, and M⁻¹ Jᵀ.
 //!
 //! A pass is compiled once per width. Which quantities a record has is checked at run time, per batch,
 //! since passes are memory-bound. Impulses are applied color by color, in the order of warm starting.
