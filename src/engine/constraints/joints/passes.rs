@@ -11,44 +11,32 @@ use std::ops::{Deref, DerefMut};
 
 /// Makes passes dereference to the pair of bodies that they work on.
 macro_rules! is_pair {
-    ($($pass:ident<$($generic:tt),*>)*) => {$(
+    ($lanes:ident: $($pass:ident[$($generic:tt),*])*) => {$(
         impl<$($generic),*> Deref for $pass<$($generic),*> {
-            type Target = JointPair<L>;
+            type Target = JointPair<$lanes>;
             #[inline(always)]
-            fn deref(&self) -> &JointPair<L> {
+            fn deref(&self) -> &JointPair<$lanes> {
                 &self.pair
             }
         }
 
         impl<$($generic),*> DerefMut for $pass<$($generic),*> {
             #[inline(always)]
-            fn deref_mut(&mut self) -> &mut JointPair<L> {
+            fn deref_mut(&mut self) -> &mut JointPair<$lanes> {
                 &mut self.pair
             }
         }
     )*};
 }
-is_pair! { JointWarmStart<L> Velocities<L> Displacements<L> Vectors<'v, L> }
+pub(super) use is_pair;
+is_pair! { L: JointWarmStart[L] Velocities[L] Displacements[L] Vectors['v, L] }
+is_pair! { f32: RigidFinder[] Collected['v] }
 
 impl<L, P: Deref<Target = JointPair<L>>> Deref for Besides<L, P> {
     type Target = JointPair<L>;
     #[inline(always)]
     fn deref(&self) -> &JointPair<L> {
         &self.of
-    }
-}
-
-impl Deref for RigidFinder {
-    type Target = JointPair<f32>;
-    fn deref(&self) -> &JointPair<f32> {
-        &self.pair
-    }
-}
-
-impl Deref for Collected<'_> {
-    type Target = JointPair<f32>;
-    fn deref(&self) -> &JointPair<f32> {
-        &self.pair
     }
 }
 

@@ -1,6 +1,6 @@
 //! Links of one type of joint: their data during a step, and their rows.
 
-use crate::engine::constraints::joints::passes::Besides;
+use crate::engine::constraints::joints::passes::{Besides, is_pair};
 use crate::engine::constraints::joints::rows::{Jacobian, JointPair, JointPass, RowLaw};
 use crate::engine::constraints::joints::{ANCHORS, JointType, Joints, placed_anchors, write_velocities};
 use crate::engine::constraints::kernels::frame::{INV_INERTIA, INV_MASS};
@@ -236,13 +236,7 @@ struct LinkPass<'a> {
     to: &'a mut [f32x8],
 }
 
-impl Deref for LinkPass<'_> {
-    type Target = JointPair<f32x8>;
-    #[inline(always)]
-    fn deref(&self) -> &JointPair<f32x8> {
-        &self.pair
-    }
-}
+is_pair! { f32x8: LinkPass['a] }
 
 impl JointPass<f32x8> for LinkPass<'_> {
     #[inline(always)]

@@ -120,17 +120,15 @@ fn shorten<L: Lanes>(
         let loads: [L; 4] = L::gather_quads::<2, 0>(quads, index);
         let [calm, most, borne_0, borne_1]: [L; 4] = L::gather_quads::<2, 1>(quads, index);
         let mut borne = [borne_0, borne_1];
-        let is_single = if layout.points == 2 {
-            record[layout.at(1, layout.normal_mass)].select_positive(zero, one)
-        } else {
-            one
+        let rises_once = match layout.points {
+            _ if !once => zero,
+            2 => record[layout.at(1, layout.normal_mass)].select_positive(zero, one),
+            _ => one,
         };
-        let [grows, whole] =
-            [grows, one].map(|part| (calm - L::splat(CALM_TIME)).select_positive(part, zero));
+        let is_calm = calm - L::splat(CALM_TIME);
         let risen = |borne: L, load: L, spring: L| {
-            let rise = (load.min(spring) - borne).max(zero);
-            let is_single = if once { is_single } else { zero };
-            let grows = is_single.select_positive(borne.select_positive(zero, whole), grows);
+            let rise = is_calm.select_positive((load.min(spring) - borne).max(zero), zero);
+            let grows = rises_once.select_positive(borne.select_positive(zero, one), grows);
             let grown = grows.mul_add(rise, borne).min(load);
             (borne + L::splat(0.5)).select_positive(grown, load)
         };
