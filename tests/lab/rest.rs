@@ -1,6 +1,7 @@
 //! The law of rest: piles of a few boxes stay in place at the standard budget.
 
 use crate::common::fastest;
+use simpulse::engine::bodies::{BodyDef, ShapeDef};
 use simpulse::engine::clock::Phase;
 use simpulse::engine::constraints::kernels::velocity::rules::{
     Frictionless, NormalRule, Soft, angular_frequencies,
@@ -306,6 +307,40 @@ fn heavy_boxes_on_pyramids_come_to_rest() {
     // The target of 1e-3 is for speeds averaged over a second and over mass. This is the fastest body of a
     // single step.
     assert!(fastest < 5e-3, "{fastest} m/s");
+}
+
+/// Load on the floor of a silo with rough walls after a minute, as a fraction of the weight in it.
+fn load_of_a_silo(without: Without) -> f64 {
+    let mut world = World::new(Settings { without, ..crate::common::settings(find("shim").unwrap()) });
+    world.settings.record_impulses = true;
+    let rough = |shape: ShapeDef| shape.with_friction(0.8);
+    let block = |x, y| rough(ShapeDef::rectangle(x, y).unwrap());
+    let floor = world.add_body(&BodyDef::fixed([0.0, -0.5]).with(block(5.0, 0.5))).unwrap();
+    for x in [-1.5, 1.5] {
+        world.add_body(&BodyDef::fixed([x, 10.0]).with(block(0.5, 10.0))).unwrap();
+    }
+    let mut weight = 0.0;
+    for i in 0..80 {
+        let place =
+            [-0.738 + 0.48 * f64::from(i % 4) + 0.009 * f64::from(i * 7 % 5), 0.3 + 0.5 * f64::from(i / 4)];
+        let shape = if i % 3 == 0 { rough(ShapeDef::circle(0.22).unwrap()) } else { block(0.2, 0.2) };
+        let body = world.add_body(&BodyDef::dynamic(place).with(shape)).unwrap();
+        weight += 10.0 / f64::from(world.bodies.inv_mass[body.index()]);
+    }
+    (0..3600).for_each(|_| world.step().unwrap());
+    let on_floor = world.contacts.iter().filter(|c| [c.body_a, c.body_b].contains(&(floor.index() as u32)));
+    let impulse: f64 = on_floor.flat_map(|c| c.step_impulse).map(|[normal, _]| f64::from(normal)).sum();
+    impulse / f64::from(world.settings.dt) / weight
+}
+
+/// Friction of the walls bears a part of the weight. Preload must not press against it.
+#[test]
+#[ignore = "known not to hold: 1.03 of the weight after a minute, 0.97 without statics"]
+fn the_floor_of_a_rough_silo_bears_no_more_than_the_weight() {
+    let statics = find("shim").unwrap().mechanism("statics").unwrap();
+    let [load, without] = [Without::default(), Without::default().and(statics)].map(load_of_a_silo);
+    println!("{load:.3} of the weight, {without:.3} without statics");
+    assert!(load < 1.0, "{load} of the weight");
 }
 
 /// Limbs that fall into each other at 9 m/s end up crossed, held by joints and pushed apart by contacts.
