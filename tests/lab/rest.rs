@@ -94,7 +94,7 @@ fn median_speed(seed: u64, without: Without) -> f64 {
 }
 
 /// Single discs keep rolling for long, as they should. The pile around them does not swell and settle with
-/// the shortening of its springs.
+/// the shortening of its springs. The limit is that of case B5.
 #[test]
 fn a_pile_of_discs_hardly_breathes() {
     let without = Without::default().and(find("shim").unwrap().mechanism("once").unwrap());
@@ -103,7 +103,7 @@ fn a_pile_of_discs_hardly_breathes() {
         speeds.sort_by(f64::total_cmp);
         speeds[1]
     });
-    assert!(free > 5.0 * once && once < 1e-3, "{once} m/s, and {free} m/s without");
+    assert!(free > 1e-4 && once < 1e-4, "{once} m/s, and {free} m/s without");
 }
 
 /// The limit of case B5.
@@ -309,11 +309,12 @@ fn heavy_boxes_on_pyramids_come_to_rest() {
     assert!(fastest < 5e-3, "{fastest} m/s");
 }
 
-/// Load on the floor of a silo with rough walls after a minute, as a fraction of the weight in it.
-fn load_of_a_silo(without: Without) -> f64 {
+/// Load on the floor of a silo with rough walls after a minute, as a fraction of the weight in it. `only_discs`: instead of
+/// boxes and some discs.
+fn load_of_a_silo(without: Without, only_discs: bool, friction: f64, variation: u32) -> f64 {
     let mut world = World::new(Settings { without, ..crate::common::settings(find("shim").unwrap()) });
     world.settings.record_impulses = true;
-    let rough = |shape: ShapeDef| shape.with_friction(0.8);
+    let rough = |shape: ShapeDef| shape.with_friction(friction);
     let block = |x, y| rough(ShapeDef::rectangle(x, y).unwrap());
     let floor = world.add_body(&BodyDef::fixed([0.0, -0.5]).with(block(5.0, 0.5))).unwrap();
     for x in [-1.5, 1.5] {
@@ -321,9 +322,10 @@ fn load_of_a_silo(without: Without) -> f64 {
     }
     let mut weight = 0.0;
     for i in 0..80 {
-        let place =
-            [-0.738 + 0.48 * f64::from(i % 4) + 0.009 * f64::from(i * 7 % 5), 0.3 + 0.5 * f64::from(i / 4)];
-        let shape = if i % 3 == 0 { rough(ShapeDef::circle(0.22).unwrap()) } else { block(0.2, 0.2) };
+        let aside = 0.009 * f64::from((i + variation) * (7 + variation) % 5);
+        let place = [-0.738 + 0.48 * f64::from(i % 4) + aside, 0.3 + 0.5 * f64::from(i / 4)];
+        let is_disc = only_discs || (i + variation).is_multiple_of(3);
+        let shape = if is_disc { rough(ShapeDef::circle(0.22).unwrap()) } else { block(0.2, 0.2) };
         let body = world.add_body(&BodyDef::dynamic(place).with(shape)).unwrap();
         weight += 10.0 / f64::from(world.bodies.inv_mass[body.index()]);
     }
@@ -333,14 +335,65 @@ fn load_of_a_silo(without: Without) -> f64 {
     impulse / f64::from(world.settings.dt) / weight
 }
 
-/// Friction of the walls bears a part of the weight. Preload must not press against it.
+/// Friction of the walls bears a part of the weight, and holds down what preload would lift. Springs that are shortened
+/// against it press on the floor; a preload that finds no room has to go. Without that the floors bear 0.17 of the
+/// weight more.
 #[test]
-#[ignore = "known not to hold: 1.03 of the weight after a minute, 0.97 without statics"]
-fn the_floor_of_a_rough_silo_bears_no_more_than_the_weight() {
-    let statics = find("shim").unwrap().mechanism("statics").unwrap();
-    let [load, without] = [Without::default(), Without::default().and(statics)].map(load_of_a_silo);
-    println!("{load:.3} of the weight, {without:.3} without statics");
-    assert!(load < 1.0, "{load} of the weight");
+fn preload_adds_no_load_in_silos() {
+    let statics = Without::default().and(find("shim").unwrap().mechanism("statics").unwrap());
+    let mut more = Vec::new();
+    for only_discs in [false, true] {
+        for friction in [0.3, 0.8] {
+            let loads = |without| {
+                let sum: f64 = (0..4).map(|i| load_of_a_silo(without, only_discs, friction, i)).sum();
+                sum / 4.0
+            };
+            let [with, without] = [Without::default(), statics].map(loads);
+            println!(
+                "only discs: {only_discs}, friction {friction}: {with:.3} of the weight, {without:.3} without statics"
+            );
+            more.push(with - without);
+        }
+    }
+    let mean = more.iter().sum::<f64>() / more.len() as f64;
+    assert!(mean < 0.1, "the floors bear {mean:.3} of the weight more");
+}
+
+/// A plug that falls into a rough taper stays wedged. Preload against the walls finds no room, so the walls bear what they
+/// bear without it, after ten seconds and after a minute.
+#[test]
+fn preload_presses_no_plug() {
+    let statics = Without::default().and(find("shim").unwrap().mechanism("statics").unwrap());
+    let pressed = |degrees: f32, friction: f64, without: Without| {
+        let mut world = World::new(Settings { without, ..crate::common::settings(find("shim").unwrap()) });
+        world.settings.record_impulses = true;
+        let wide = |y: f32| 0.5 + degrees.to_radians().tan() * y;
+        let mut add = |body: BodyDef, vertices: [[f32; 2]; 4]| {
+            let shape = ShapeDef::polygon(&vertices).unwrap().with_friction(friction);
+            world.add_body(&body.with(shape)).unwrap()
+        };
+        let [low, high] = [-3.0, 3.0].map(wide);
+        add(BodyDef::fixed([0.0; 2]), [[low, -3.0], [2.0, -3.0], [2.0, 3.0], [high, 3.0]]);
+        add(BodyDef::fixed([0.0; 2]), [[-high, 3.0], [-2.0, 3.0], [-2.0, -3.0], [-low, -3.0]]);
+        let [low, high] = [-0.5, 0.5].map(wide);
+        let plug = [[-low, -0.5], [low, -0.5], [high, 0.5], [-high, 0.5]];
+        let plug = add(BodyDef::dynamic([0.0, 0.1]), plug);
+        let weight = 10.0 / f64::from(world.bodies.inv_mass[plug.index()]);
+        [600, 3000].map(|steps| {
+            (0..steps).for_each(|_| world.step().unwrap());
+            let impulse: f64 =
+                world.contacts.iter().flat_map(|c| c.step_impulse).map(|[normal, _]| f64::from(normal)).sum();
+            impulse / f64::from(world.settings.dt) / weight
+        })
+    };
+    for (degrees, friction) in [(1.0, 0.5), (3.0, 0.3)] {
+        let [with, without] = [Without::default(), statics].map(|parts| pressed(degrees, friction, parts));
+        println!("taper of {degrees}°: {with:.2?} weights, {without:.2?} without statics");
+        assert!(
+            with.iter().all(|load| *load < 1.1 * without[0]),
+            "{with:?}, without statics {without:?} weights"
+        );
+    }
 }
 
 /// Limbs that fall into each other at 9 m/s end up crossed, held by joints and pushed apart by contacts.

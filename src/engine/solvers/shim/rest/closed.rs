@@ -11,6 +11,11 @@
 //! body pauses between swings. If its springs are also shortened for nearly all of its load, they follow the
 //! load at once from then on ([`super::shorten`]).
 //!
+//! As long as it is not, the load of a slow contact is at most the force of its spring. Loads that squeeze a body
+//! between others have no single solution. Those of a landing, which loads start from, may be many times what the
+//! springs bear afterwards, and preload for them would wedge the body: a plug dropped into a taper of 1° was pressed by
+//! 48 instead of 24 times its weight.
+//!
 //! The part of the impulses for which springs are not shortened is the part that statics does not explain.
 
 use super::{JOINED, OPEN};
@@ -30,8 +35,9 @@ const CALM_SPEED: f32 = 1e-3;
 /// Time after which a slow contact is calm (s).
 pub(super) const CALM_TIME: f32 = 0.3;
 
-/// Fraction of its load at which the springs of a calm contact start to follow the load at once (1).
-const NEARLY: f32 = 0.99;
+/// Fraction of its load at which the springs of a calm contact start to follow the load at once, and of the force of a
+/// spring above which it is more than its load (1).
+pub(super) const NEARLY: f32 = 0.99;
 
 /// Largest preload ÷ (mass × radius of gyration ÷ dt²) (1); see [`super::shorten`].
 const MOST: f32 = 50.0;
@@ -111,17 +117,20 @@ fn close<L: Lanes>(
             let is_closed = at(layout.normal_mass).min(is_free).select_positive(stays, zero);
             let has_borne = last[2 * p] + L::splat(0.5);
             let begun = |kept: L, impulse: L| has_borne.select_positive(kept, impulse * per_substep);
-            let normal = begun(last[2 * p], at(layout.normal_impulse));
-            let tangent =
-                if layout.has_friction { begun(last[2 * p + 1], at(layout.tangent_impulse)) } else { zero };
+            let borne = if p == 0 { borne_0 } else { borne_1 };
+            let lacks =
+                (borne + L::splat(0.5)).select_positive(L::splat(NEARLY).mul_add(last[2 * p], -borne), zero);
+            let carried = at(layout.normal_impulse) * per_substep / last[2 * p];
+            let carried = carried.max(L::splat(f32::EPSILON)).min(one);
+            let share = last[2 * p].min(calm).min(lacks).select_positive(carried, one);
+            let last = [last[2 * p] * share, last[2 * p + 1] * share];
+            let normal = begun(last[0], at(layout.normal_impulse));
+            let tangent = if layout.has_friction { begun(last[1], at(layout.tangent_impulse)) } else { zero };
             loads[2 * p] = is_closed.select_positive(normal, open);
             loads[2 * p + 1] = is_closed.select_positive(tangent, zero);
             let impulse = [loads[2 * p].max(zero) * h, loads[2 * p + 1] * h];
             // The rest of the impulses is what statics does not explain.
-            let borne = if p == 0 { borne_0 } else { borne_1 };
-            let part = last[2 * p].select_positive(borne.max(zero) / last[2 * p], one);
-            let lacks =
-                (borne + L::splat(0.5)).select_positive(L::splat(NEARLY).mul_add(last[2 * p], -borne), zero);
+            let part = last[0].select_positive(borne.max(zero) / last[0], one);
             is_short = is_short.max(lacks);
             let at = layout.at(p, layout.normal_impulse);
             record[at] = part.neg_mul_add(impulse[0], record[at]);

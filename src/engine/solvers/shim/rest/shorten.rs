@@ -27,6 +27,21 @@
 //! Calm contacts whose preload is nearly their whole load follow at once, so leaning columns get the moment
 //! that they need. So do contacts found in the first step of one of their bodies.
 //!
+//! # Preload that finds no room
+//!
+//! A shortened spring lifts what it bears. If friction holds that down, as the wall of a silo does, the separation s < 0
+//! stays, and the spring carries F more than before: λ/h = F − k s > N. So a preload falls by what its spring carries beyond
+//! the load:
+//!
+//! ```text
+//! F ← F − max(0, 0.99 λ/h − N) dt/(τ_c + dt)
+//! ```
+//!
+//! with τ_c the time after which a slow contact is calm, so that the impulses of an instant hardly count. (Without
+//! the factor 0.99 rounding errors wear preloads down: columns of discs sank by 100 nm in fifteen seconds.)
+//! A preload that moves nothing goes back to zero, and what was in equilibrium without preload is so again.
+//! Where bodies are free, the spring carries N while it lifts them, and F stays.
+//!
 //! # Crushed bodies
 //!
 //! A contact is a spring along a fixed normal only while its bodies turn little. If the load F on the other side of a body goes,
@@ -48,7 +63,7 @@
 //! some contact slips, loads change, and the pile swells and settles forever. So a contact of one point is
 //! shortened for its load once, when it is calm for the first time. After that its preload only falls.
 
-use super::closed::CALM_TIME;
+use super::closed::{CALM_TIME, NEARLY};
 use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
 use crate::engine::constraints::kernels::velocity::rules::{Soft, Softness};
 use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
@@ -106,8 +121,8 @@ fn shorten<L: Lanes>(
     };
     // Sag per load and effective mass (s²).
     let compliance = L::splat(h * impulse_scale / (mass_scale * bias_rate));
-    let grows = L::splat(dt / (RISE + dt));
-    let (zero, one) = (L::zero(), L::splat(1.0));
+    let [rises_in, falls_in] = [RISE, CALM_TIME].map(|tau| L::splat(dt / (tau + dt)));
+    let (zero, one, nearly) = (L::zero(), L::splat(1.0), L::splat(NEARLY));
     let (h_lanes, per_substep) = (L::splat(h), L::splat(1.0 / h));
     let SegmentRecords { records, contact, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact_mut(layout.stride);
@@ -128,8 +143,9 @@ fn shorten<L: Lanes>(
         let is_calm = calm - L::splat(CALM_TIME);
         let risen = |borne: L, load: L, spring: L| {
             let rise = is_calm.select_positive((load.min(spring) - borne).max(zero), zero);
-            let grows = rises_once.select_positive(borne.select_positive(zero, one), grows);
+            let grows = rises_once.select_positive(borne.select_positive(zero, one), rises_in);
             let grown = grows.mul_add(rise, borne).min(load);
+            let grown = falls_in.neg_mul_add((nearly * spring - load).max(zero), grown).max(zero);
             (borne + L::splat(0.5)).select_positive(grown, load)
         };
         for p in 0..layout.points {
