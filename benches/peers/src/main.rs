@@ -17,6 +17,7 @@
 mod box2d;
 mod check;
 mod engine;
+mod longest;
 mod ours;
 mod picture;
 mod race;
@@ -25,7 +26,8 @@ mod table;
 mod torture;
 
 use clap::Parser;
-use simpulse::lab::torture::families::Family;
+use simpulse::lab::torture::Campaign;
+use simpulse::lab::torture::families::{FAMILIES, Family};
 use std::path::PathBuf;
 
 /// Scenes of the race, their number of steps, and whether nothing in them may fall.
@@ -74,6 +76,12 @@ struct Args {
     /// Families of these random scenes [default: all]
     #[arg(long, value_delimiter = ',', value_name = "FAMILY,…", requires = "torture", value_parser = simpulse::lab::torture::family)]
     families: Vec<&'static Family>,
+    /// Time these scenes instead, N times in each engine, `shim` included: the longest step ÷ Box2D's
+    #[arg(long, value_name = "N", requires = "torture", value_parser = clap::value_parser!(u32).range(1..))]
+    pace: Option<u32>,
+    /// Write the step times of each of these scenes to this CSV file
+    #[arg(long, value_name = "FILE", requires = "pace")]
+    log: Option<PathBuf>,
     /// Run nothing; draw peers.svg again from the peers.csv in the folder
     #[arg(long)]
     draw: bool,
@@ -91,7 +99,13 @@ fn main() {
 
 fn run(args: &Args) -> Result<(), String> {
     if let Some(scenes) = args.torture {
-        return torture::run(args.seed.unwrap_or(1), args.families.clone(), scenes);
+        let families =
+            if args.families.is_empty() { FAMILIES.iter().collect() } else { args.families.clone() };
+        let campaign = Campaign { seed: args.seed.unwrap_or(1), families, scenes };
+        return match args.pace {
+            Some(repeats) => longest::compare(&campaign, repeats, args.log.as_ref()),
+            None => torture::run(&campaign),
+        };
     }
     let path = args.out.join("peers.csv");
     let failed = |e: csv::Error| format!("{}: {e}", path.display());

@@ -2,7 +2,6 @@
 
 use crate::engine::{Contender, Engine, Maker};
 use crate::race::build;
-use simpulse::lab::torture::families::{FAMILIES, Family};
 use simpulse::lab::torture::{self, Campaign, CaseOutcome, TortureCase, TortureRow, table};
 
 /// Another engine, behind the interface of the checks.
@@ -39,12 +38,9 @@ fn one(case: &TortureCase, contender: &Contender) -> Result<CaseOutcome, String>
 
 /// Prints the table by family. Runs on one thread, because Box2D keeps its worlds in a list without a lock.
 /// Errors: none from an engine; scenes that it does not support are counted.
-pub fn run(seed: u64, mut families: Vec<&'static Family>, scenes: u32) -> Result<(), String> {
-    let (engines, mut rows, mut refused) = (engines(), Vec::new(), 0);
-    if families.is_empty() {
-        families = FAMILIES.iter().collect();
-    }
-    for (family, number) in (Campaign { seed, families, scenes }).list() {
+pub fn run(campaign: &Campaign) -> Result<(), String> {
+    let (engines, seed, mut rows, mut refused) = (engines(), campaign.seed, Vec::new(), 0);
+    for (family, number) in campaign.list() {
         let case = family.case(seed, number);
         for (name, contender) in &engines {
             let (family, solver) = (family.name.to_string(), name.to_string());

@@ -18,7 +18,7 @@
 //! the length of f. By the triangle inequality, a body then passes on no more than the weights of everything
 //! that it bears.
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
 /// Added to the diagonal of A Aᵀ, whose entries are of the order of 1.
 const RIDGE: f64 = 1e-6;
@@ -54,33 +54,70 @@ impl Support {
 
 /// Distributes a force (N) and a torque (N·m) on a body of this radius of gyration (m) over `supports`.
 pub(crate) fn load(supports: &mut [Support], force: DVec2, torque: f64, gyration: f64) {
-    let column = |s: &Support, u: DVec2| {
-        DVec3::new(u.x, u.y, if gyration > 0.0 { s.arm.perp_dot(u) / gyration } else { 0.0 })
-    };
-    let outer = |c: DVec3| DMat3::from_cols(c * c.x, c * c.y, c * c.z);
-    let all = -DVec3::new(force.x, force.y, if gyration > 0.0 { torque / gyration } else { 0.0 });
+    let per_gyration = if gyration > 0.0 { 1.0 / gyration } else { 0.0 };
+    let column = |s: &Support, u: DVec2| DVec3::new(u.x, u.y, s.arm.perp_dot(u) * per_gyration);
+    let all = -DVec3::new(force.x, force.y, torque * per_gyration);
     supports.iter_mut().for_each(|support| support.load = [1.0, 0.0]);
     for _ in 0..2 {
         let most = supports.iter().map(|s| s.load[0]).fold(0.0, f64::max);
-        let mut matrix = DMat3::from_diagonal(DVec3::splat(RIDGE));
+        let per_load = 1.0 / most;
+        let mut matrix = Gram::default();
         for support in supports.iter().filter(|s| s.load[0] > 0.0) {
-            matrix += outer(column(support, support.normal));
+            matrix.add(1.0, column(support, support.normal));
             if support.friction > 0.0 {
-                matrix += support.load[0] / most * outer(column(support, support.tangent()));
+                matrix.add(support.load[0] * per_load, column(support, support.tangent()));
             }
         }
-        let solution = matrix.inverse() * all;
+        let solution = matrix.solve(all);
         for support in supports.iter_mut().filter(|s| s.load[0] > 0.0) {
             let normal = column(support, support.normal).dot(solution).max(0.0);
-            let tangent = support.load[0] / most * column(support, support.tangent()).dot(solution);
+            let tangent = support.load[0] * per_load * column(support, support.tangent()).dot(solution);
             let bound = support.friction * normal;
             support.load = [normal, tangent.max(-bound).min(bound)];
         }
     }
     let total: DVec2 = supports.iter().map(Support::force).sum();
-    if total.length() > force.length() {
-        let share = force.length() / total.length();
+    if total.length_squared() > force.length_squared() {
+        let share = (force.length_squared() / total.length_squared()).sqrt();
         supports.iter_mut().for_each(|support| support.load = support.load.map(|load| load * share));
+    }
+}
+
+/// A W Aᵀ + ε, by the six entries of its upper half.
+struct Gram {
+    /// Diagonal.
+    on: DVec3,
+    /// Entries yz, zx and xy.
+    off: DVec3,
+}
+
+impl Default for Gram {
+    fn default() -> Self {
+        Gram { on: DVec3::splat(RIDGE), off: DVec3::ZERO }
+    }
+}
+
+impl Gram {
+    /// Adds w c cᵀ.
+    fn add(&mut self, weight: f64, c: DVec3) {
+        let scaled = weight * c;
+        self.on += scaled * c;
+        self.off += DVec3::new(scaled.y * c.z, scaled.z * c.x, scaled.x * c.y);
+    }
+
+    /// The inverse, by its adjugate, times `b`.
+    fn solve(&self, b: DVec3) -> DVec3 {
+        let Gram { on, off } = self;
+        let rotated = DVec3::new(off.y * off.z, off.z * off.x, off.x * off.y);
+        let adjugate_on = DVec3::new(on.y * on.z, on.z * on.x, on.x * on.y) - *off * *off;
+        let adjugate_off = rotated - *off * *on;
+        let determinant = on.x * adjugate_on.x + off.z * adjugate_off.z + off.y * adjugate_off.y;
+        let mixed = DVec3::new(
+            adjugate_off.z * b.y + adjugate_off.y * b.z,
+            adjugate_off.z * b.x + adjugate_off.x * b.z,
+            adjugate_off.y * b.x + adjugate_off.x * b.y,
+        );
+        (adjugate_on * b + mixed) / determinant
     }
 }
 

@@ -7,7 +7,7 @@
 //!
 //! "Below" means nearer to the ground in the graph of contacts whose normals are within 60° of gravity. Bodies that
 //! these do not connect with the ground, such as a row of boxes pressed against a wall, use the graph of all
-//! contacts.
+//! contacts of such bodies.
 
 use super::{OPEN, PER_CONTACT};
 use crate::engine::bodies::{Bodies, BodyKind};
@@ -30,15 +30,46 @@ const ALIKE: f32 = 0.99;
 /// Hands loads down; keeps its memory from call to call.
 #[derive(Clone, Debug, Default)]
 pub(in super::super) struct HandDown {
-    upright: Graph,
-    /// Contacts of `upright`.
-    bearing: Vec<u32>,
-    /// Graph of all contacts; empty if `upright` supports all bodies with contacts.
-    all: Graph,
+    /// Contacts that hand loads down.
+    upright: Below,
+    /// Contacts of bodies that `upright` does not connect with the ground.
+    hanging: Below,
     /// Bodies from the top downward.
     downwards: Vec<u32>,
     /// Supports of the current body.
     supports: Vec<Support>,
+}
+
+/// The graph of some contacts.
+#[derive(Clone, Debug, Default)]
+struct Below {
+    graph: Graph,
+    /// The contact of each edge. `[edges]`
+    contacts: Vec<u32>,
+}
+
+impl Below {
+    /// Builds the graph of the chosen contacts.
+    fn build(
+        &mut self,
+        bodies: usize,
+        contacts: &[Contact],
+        is_chosen: impl Fn(&Contact) -> bool,
+        is_dynamic: impl Fn(u32) -> bool,
+    ) {
+        self.contacts.clear();
+        self.contacts.extend((0..).zip(contacts).filter(|(_, contact)| is_chosen(contact)).map(|(i, _)| i));
+        let ends = |c: &u32| [contacts[*c as usize].body_a, contacts[*c as usize].body_b];
+        self.graph.build(bodies, self.contacts.iter().map(ends), is_dynamic);
+    }
+
+    /// Contacts of a body, with the body on their other side.
+    fn of(&self, body: u32) -> impl Iterator<Item = (u32, u32)> {
+        self.graph.edges_of(body as usize).iter().map(move |&edge| {
+            let [a, b] = self.graph.ends(edge as usize);
+            (self.contacts[edge as usize], if a == body { b } else { a })
+        })
+    }
 }
 
 /// The data that [`HandDown::run`] works on.
@@ -60,7 +91,7 @@ impl HandDown {
     /// world come or go would make a pile depend on another.
     pub fn is_stale(&self, contacts: &[Contact], gravity: Vec2) -> bool {
         let up = up(gravity);
-        let mut bearing = self.bearing.iter().peekable();
+        let mut bearing = self.upright.contacts.iter().peekable();
         (0..).zip(contacts).any(|(i, contact)| bears(contact, up) != bearing.next_if_eq(&&i).is_some())
     }
 
@@ -70,25 +101,14 @@ impl HandDown {
         let is_dynamic = |body: u32| {
             bodies.kind[body as usize] == BodyKind::Dynamic && joined.get(body as usize) != Some(&true)
         };
-        let ends = |c: &u32| [contacts[*c as usize].body_a, contacts[*c as usize].body_b];
-        self.bearing.clear();
-        self.bearing.extend((0..).zip(contacts).filter(|(_, contact)| bears(contact, up)).map(|(i, _)| i));
-        self.upright.build(bodies.len(), self.bearing.iter().map(ends), is_dynamic);
-        let hangs = |c: &Contact| {
-            [c.body_a, c.body_b]
-                .into_iter()
-                .any(|b| is_dynamic(b) && self.upright.levels()[b as usize] == UNSUPPORTED)
-        };
-        self.downwards.clear();
-        if contacts.iter().any(hangs) {
-            let ends = contacts.iter().map(|c| [c.body_a, c.body_b]);
-            self.all.build(bodies.len(), ends, is_dynamic);
-            let hangs = |body: &&u32| self.upright.levels()[**body as usize] == UNSUPPORTED;
-            self.downwards.extend(self.all.upwards().iter().rev().filter(hangs));
-        } else {
-            self.all = Graph::default();
-        }
-        self.downwards.extend(self.upright.upwards().iter().rev());
+        let Self { upright, hanging, downwards, .. } = self;
+        upright.build(bodies.len(), contacts, |contact| bears(contact, up), is_dynamic);
+        let levels = upright.graph.levels();
+        let hangs = |body: u32| is_dynamic(body) && levels[body as usize] == UNSUPPORTED;
+        let of_hanging = |contact: &Contact| hangs(contact.body_a) || hangs(contact.body_b);
+        hanging.build(bodies.len(), contacts, of_hanging, hangs);
+        downwards.clear();
+        downwards.extend([hanging, upright].iter().flat_map(|below| below.graph.upwards().iter().rev()));
     }
 
     /// Supports accelerating bodies by loads on the bodies below, from top to bottom.
@@ -119,60 +139,51 @@ impl HandDown {
 
     /// Whether a body leans, on a body of its own level or on several in different directions: only sweeps find its thrust.
     fn leans(&self, contacts: &[Contact], body: u32) -> bool {
-        let hangs = self.upright.levels()[body as usize] == UNSUPPORTED;
-        let graph = if hangs { &self.all } else { &self.upright };
-        let level = graph.levels()[body as usize];
-        let mut below: Option<Vec2> = None;
-        for &edge in graph.edges_of(body as usize) {
-            let [a, b] = graph.ends(edge as usize);
-            let contact = if hangs { edge } else { self.bearing[edge as usize] };
-            let (other, n) = (if a == body { b } else { a }, contacts[contact as usize].manifold.normal);
-            let (of_other, normal) = (graph.levels()[other as usize], if b == body { n } else { -n });
-            if of_other == level {
-                return true;
-            }
-            if of_other < level && below.get_or_insert(normal).dot(normal) < ALIKE {
+        let below = self.below(body);
+        let level = below.graph.levels()[body as usize];
+        let mut normal: Option<Vec2> = None;
+        for (contact, other) in below.of(body) {
+            let Contact { manifold, body_b, .. } = &contacts[contact as usize];
+            let (of_other, n) = (below.graph.levels()[other as usize], manifold.normal);
+            let n = if *body_b == body { n } else { -n };
+            if of_other == level || of_other < level && normal.get_or_insert(n).dot(n) < ALIKE {
                 return true;
             }
         }
         false
     }
 
+    /// The graph in which a body stands on those below it.
+    fn below(&self, body: u32) -> &Below {
+        let hangs = self.upright.graph.levels()[body as usize] == UNSUPPORTED;
+        if hangs { &self.hanging } else { &self.upright }
+    }
+
     /// Lists the closed points of `body` with the bodies below it, and their loads.
     fn find_supports(&mut self, on: &HandDownInput<'_>, body: u32) {
-        self.supports.clear();
-        let level = self.upright.levels()[body as usize];
-        let hangs = level == UNSUPPORTED;
-        let graph = if hangs { &self.all } else { &self.upright };
-        for &edge in graph.edges_of(body as usize) {
-            let [a, b] = graph.ends(edge as usize);
-            let other = if a == body { b } else { a } as usize;
-            let is_below = if hangs {
-                self.upright.levels()[other] != UNSUPPORTED
-                    || self.all.levels()[other] < self.all.levels()[body as usize]
-            } else {
-                self.upright.levels()[other] < level
-            };
-            if !is_below {
-                continue;
-            }
-            let index = if hangs { edge } else { self.bearing[edge as usize] };
+        let mut supports = std::mem::take(&mut self.supports);
+        supports.clear();
+        let below = self.below(body);
+        let levels = below.graph.levels();
+        let is_below = |other: u32| levels[other as usize] < levels[body as usize];
+        for (index, _) in below.of(body).filter(|(_, other)| is_below(*other)) {
             let contact = &on.contacts[index as usize];
-            let normal = contact.manifold.normal.as_dvec2();
+            let (normal, is_b) = (contact.manifold.normal.as_dvec2(), contact.body_b == body);
             let loads = &on.kept[PER_CONTACT * index as usize..][..4];
             for (point, p) in contact.manifold.points().iter().enumerate() {
                 if loads[2 * point] != OPEN {
-                    self.supports.push(Support {
+                    supports.push(Support {
                         contact: index,
                         point,
-                        normal: if b == body { normal } else { -normal },
-                        arm: if b == body { p.anchor_b } else { p.anchor_a }.as_dvec2(),
+                        normal: if is_b { normal } else { -normal },
+                        arm: if is_b { p.anchor_b } else { p.anchor_a }.as_dvec2(),
                         friction: f64::from(contact.friction),
                         load: [loads[2 * point], loads[2 * point + 1]].map(f64::from),
                     });
                 }
             }
         }
+        self.supports = supports;
     }
 
     /// Finds the loads that support `body`.
@@ -208,9 +219,8 @@ impl HandDown {
 
     /// Bytes held.
     pub fn held_bytes(&self) -> usize {
-        self.upright.held_bytes()
-            + self.all.held_bytes()
-            + held(&self.bearing)
+        let graphs = [&self.upright, &self.hanging];
+        graphs.iter().map(|below| below.graph.held_bytes() + held(&below.contacts)).sum::<usize>()
             + held(&self.downwards)
             + held(&self.supports)
     }

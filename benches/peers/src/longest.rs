@@ -1,0 +1,159 @@
+//! The longest steps of random scenes, relative to those of Box2D in the same scene.
+//!
+//! Engines take turns, scene by scene and run by run. Runs are deterministic, so the time of a step is the
+//! minimum over them. The answers are checked by [`crate::torture`].
+
+use crate::engine::{Contender, Maker};
+use crate::race::build;
+use comfy_table::{Table, presets::UTF8_FULL_CONDENSED};
+use serde::Serialize;
+use simpulse::engine::clock::timed;
+use simpulse::engine::solvers;
+use simpulse::lab::study::sample::quantile;
+use simpulse::lab::torture::families::Family;
+use simpulse::lab::torture::{Campaign, TortureCase, substeps};
+use std::path::PathBuf;
+
+/// Limit on the longest step, as a multiple of Box2D's in the same scene (1).
+const LIMIT: f64 = 2.0;
+
+/// Engines at their defaults. The first is the reference.
+const ENGINES: [(&str, Contender); 3] = {
+    let own = Contender { maker: Maker::Box2d, substeps: 4, hertz: 30.0, recycling: true, continuous: true };
+    [
+        ("Box2D", own),
+        ("rapier", Contender { maker: Maker::Rapier, continuous: false, ..own }),
+        ("shim", Contender { maker: Maker::Solver("shim"), ..own }),
+    ]
+};
+
+/// Times of the steps of a scene in an engine (µs).
+#[derive(Serialize)]
+struct Row {
+    family: &'static str,
+    number: u32,
+    engine: &'static str,
+    first: f64,
+    longest: f64,
+    longest_step: usize,
+    mean: f64,
+}
+
+impl Row {
+    fn of(family: &'static str, number: u32, engine: &'static str, steps: &[f64]) -> Self {
+        let (at, longest) = steps
+            .iter()
+            .enumerate()
+            .fold((0, 0.0), |most, (k, &us)| if us > most.1 { (k, us) } else { most });
+        let mean = steps.iter().sum::<f64>() / steps.len().max(1) as f64;
+        let first = steps.first().copied().unwrap_or(0.0);
+        Row { family, number, engine, first, longest, longest_step: at + 1, mean }
+    }
+}
+
+/// Runs a case to its end, or until the engine reports that it diverged. Keeps the shorter time of each step
+/// (µs). Errors: a part of the scene that the engine does not support.
+fn run(case: &TortureCase, contender: &Contender, least: &mut Vec<f64>) -> Result<(), String> {
+    let own = match contender.maker {
+        Maker::Solver(name) => {
+            let solver = solvers::find(name).map_err(|e| e.to_string())?;
+            substeps(case, solver, solver.budget.substeps)
+        }
+        _ => case.substeps.unwrap_or(contender.substeps),
+    };
+    let mut engine = build(&Contender { substeps: own, ..*contender }, &case.scene)?;
+    for step in 0..case.scene.steps as usize {
+        let (stepped, took) = timed(|| engine.step());
+        let us = 1e6 * took.as_secs_f64();
+        match least.get_mut(step) {
+            None => least.push(us),
+            Some(least) => *least = us.min(*least),
+        }
+        if stepped.is_err() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// Times the scenes of a campaign `repeats` times in each engine and prints a table; writes the rows of all
+/// scenes to a CSV file. Errors: the file.
+pub fn compare(campaign: &Campaign, repeats: u32, log: Option<&PathBuf>) -> Result<(), String> {
+    let failed = |e: csv::Error| format!("{}: {e}", log.map_or(String::new(), |p| p.display().to_string()));
+    let mut csv = log.map(csv::Writer::from_path).transpose().map_err(failed)?;
+    let (mut rows, mut refused) = (Vec::new(), 0);
+    for (family, number) in campaign.list() {
+        let case = family.case(campaign.seed, number);
+        let mut steps = ENGINES.map(|_| Ok(Vec::new()));
+        for _ in 0..repeats {
+            for ((_, contender), steps) in ENGINES.iter().zip(&mut steps) {
+                if let Ok(least) = steps
+                    && let Err(message) = run(&case, contender, least)
+                {
+                    *steps = Err(message);
+                }
+            }
+        }
+        let [Ok(a), Ok(b), Ok(c)] = &steps else {
+            refused += 1;
+            continue;
+        };
+        let scene = [a, b, c].map(|steps| steps.as_slice());
+        let mut engine = 0;
+        let scene = scene.map(|steps| {
+            engine += 1;
+            Row::of(family.name, number, ENGINES[engine - 1].0, steps)
+        });
+        if let Some(csv) = &mut csv {
+            scene
+                .iter()
+                .try_for_each(|row| csv.serialize(row))
+                .and_then(|()| Ok(csv.flush()?))
+                .map_err(failed)?;
+        }
+        rows.push(scene);
+    }
+    println!(
+        "Step times ÷ those of {} in the same scene, on one thread; {refused} scenes refused",
+        ENGINES[0].0
+    );
+    println!("{}", table(&campaign.families, &rows));
+    Ok(())
+}
+
+/// One line per family and engine, then all families together.
+fn table(families: &[&'static Family], rows: &[[Row; ENGINES.len()]]) -> Table {
+    let mut table = Table::new();
+    table.load_style(UTF8_FULL_CONDENSED);
+    let over = format!("over {LIMIT}");
+    table.set_header([
+        "family",
+        "engine",
+        "scenes",
+        "longest",
+        "99 %",
+        "most",
+        over.as_str(),
+        "mean",
+        "most",
+    ]);
+    for family in families.iter().map(|f| f.name).chain(["all"]) {
+        for engine in 1..ENGINES.len() {
+            let own = || rows.iter().filter(|scene| scene[0].family == family || family == "all");
+            let ratios = |get: fn(&Row) -> f64| -> Vec<f64> {
+                own().map(|scene| get(&scene[engine]) / get(&scene[0])).collect()
+            };
+            let (longest, mean) = (ratios(|row| row.longest), ratios(|row| row.mean));
+            if longest.is_empty() {
+                continue;
+            }
+            let mut cells =
+                vec![family.to_string(), ENGINES[engine].0.to_string(), longest.len().to_string()];
+            cells.extend([0.5, 0.99, 1.0].map(|p| format!("{:.2}", quantile(&longest, p))));
+            cells.push(longest.iter().filter(|&&ratio| ratio > LIMIT).count().to_string());
+            cells.extend([0.5, 1.0].map(|p| format!("{:.2}", quantile(&mean, p))));
+            table.add_row(cells);
+        }
+    }
+    table
+}
