@@ -51,12 +51,18 @@ pub(crate) struct TouchFrame {
 }
 
 impl Round {
+    /// Whether a contact is one of round shapes.
+    pub fn is_of(contact: &Contact) -> bool {
+        let reach = contact.radii[0] + contact.radii[1];
+        reach > 0.0 && reach < f32::INFINITY
+    }
+
     /// The round shapes of a contact, if it has any. `is_held`: a is held, and the point lies on b's surface.
     pub fn of(contact: &Contact, is_held: bool) -> Option<Self> {
-        let (radii, reach) = (contact.radii, contact.radii[0] + contact.radii[1]);
-        if reach == 0.0 || reach == f32::INFINITY {
+        if !Self::is_of(contact) {
             return None;
         }
+        let (radii, reach) = (contact.radii, contact.radii[0] + contact.radii[1]);
         let Manifold { points: [point, _], normal, .. } = contact.manifold;
         // The point is on b's surface if a is held, else in the middle of the gap.
         let of_gap = if is_held { 0.0 } else { 0.5 };

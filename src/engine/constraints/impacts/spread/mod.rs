@@ -50,6 +50,7 @@ mod law;
 mod pair;
 mod point;
 
+use crate::engine::constraints::impacts::touch::Round;
 use crate::engine::disjoint::DisjointSets;
 use crate::engine::lanes::held;
 pub(crate) use find::{Find, impact_speeds};
@@ -166,7 +167,8 @@ impl Spread {
                 on.leave(point);
             }
             if on.record_impulses {
-                let sum = &mut on.contacts[point.contact as usize].step_impulse[point.index as usize];
+                let contact = on.contact_of(point.lane);
+                let sum = &mut on.contacts[contact].step_impulse[usize::from(point.index)];
                 *sum = [sum[0] + point.given[0], sum[1] + point.given[1]];
             }
         }
@@ -201,7 +203,6 @@ impl Spread {
                 self.visit(on, place, bounces);
             }
             let is_solved = self.spread(on, bounces);
-            self.end_wave();
             if !is_solved {
                 break;
             }
@@ -228,7 +229,7 @@ impl Spread {
             }
         }
         self.pushed.clear();
-        for point in self.points[self.first..].iter().filter(|point| point.mass > 0.0) {
+        for point in self.points[self.first..].iter().filter(|point| point.exists) {
             if point.gap(on.rows) < point.separation.min(0.0) - deeper {
                 self.pushed.extend(&point.rows[usize::from(!point.pushes_a)..]);
             }
@@ -243,11 +244,10 @@ impl Spread {
         let mut any = false;
         for place in self.first..self.points.len() {
             let point = &mut self.points[place];
-            point.begun = point.impulse;
             if point.role == Role::Bounces {
                 point.role = Role::Left;
             }
-            if point.role == Role::Stops || point.mass <= 0.0 {
+            if point.role == Role::Stops || !point.exists {
                 continue;
             }
             let Some(mut target) = rebounds(point, on, is_first) else { continue };
@@ -256,7 +256,7 @@ impl Spread {
                 any = true;
                 continue;
             }
-            if let Some(round) = point.round.filter(|_| on.timed) {
+            if let Some(round) = on.round(point) {
                 let ends = point.rows.map(|row| &on.rows[row as usize]);
                 if let Some(frame) = round.frame(ends, [-AHEAD * on.dt, on.dt]) {
                     let mut turned = *point;
@@ -265,7 +265,6 @@ impl Spread {
                     // If the turned point does not bounce, the row of the start would still stop it, so it
                     // bounces on that row.
                     if let Some(then) = rebounds(&turned, on, is_first) {
-                        turned.round = None;
                         on.turn(&turned, &frame);
                         (*point, target) = (turned, then);
                     }
@@ -274,7 +273,7 @@ impl Spread {
             let [v, slip] = point.velocity(on.rows);
             (point.target, point.time) = (target[0], target[1]);
             (point.slip, point.lost) = (slip, (-v - target[0]).max(0.0));
-            (point.role, point.impulse, point.begun) = (Role::Bounces, [0.0; 2], [0.0; 2]);
+            (point.role, point.impulse) = (Role::Bounces, [0.0; 2]);
             any = true;
         }
         any
@@ -293,35 +292,28 @@ impl Spread {
             let point = self.points[place];
             let time =
                 point.rows.map(|row| self.bodies[row as usize].time).into_iter().fold(STILL.time, f32::max);
-            let brings_back = point.k[0] * point.borne[0] * (on.dt / on.h);
-            if point.is_round
-                || point.role != Role::Open
-                || point.borne[0] <= 0.0
-                || time == STILL.time
-                || point.velocity(on.rows)[0] <= brings_back
-            {
+            if point.role != Role::Open || !point.exists || time == STILL.time {
+                continue;
+            }
+            let speed = point.velocity(on.rows)[0];
+            if speed <= 0.0 {
+                continue;
+            }
+            let borne = on.borne(&point);
+            let brings_back = point.k[0] * borne[0] * (on.dt / on.h);
+            if borne[0] <= 0.0 || speed <= brings_back || Round::is_of(on.contact(&point)) {
                 continue;
             }
             on.release(&point);
-            self.points[place].borne = [0.0; 2];
             if time < 0.0 && point.pushes_a || !on.timed {
                 continue;
             }
-            let given = point.borne.map(|impulse| impulse * (time / on.h));
+            let given = borne.map(|impulse| impulse * (time / on.h));
             self.points[place].given = given;
             self.push(on, place, given, [0.5 * time, time]);
             any = true;
         }
         any
-    }
-
-    /// Adds the impulses of the wave to those of earlier waves.
-    fn end_wave(&mut self) {
-        for point in &mut self.points[self.first..] {
-            for k in 0..2 {
-                point.given[k] += point.impulse[k] - point.begun[k];
-            }
-        }
     }
 
     /// Visits the points of pushed bodies until none is left or the bound is reached. Returns whether none is
@@ -367,8 +359,7 @@ impl Spread {
         let coupling = points[0].coupling(&points[1], on.rows);
         let Some(new) = pair::impulses(k, coupling, old, wanted) else { return };
         for i in 0..2 {
-            self.points[first + i].impulse[0] = new[i];
-            self.push(on, first + i, [new[i] - old[i], 0.0], [points[i].time; 2]);
+            self.change(on, first + i, [new[i], points[i].impulse[1]]);
         }
     }
 
@@ -379,14 +370,17 @@ impl Spread {
             for row in point.rows {
                 point.time = point.time.max(self.bodies[row as usize].time);
             }
-            point.meet(on.rows);
+            // Nothing turns a smooth disc.
+            if point.pushes_a && (point.friction > 0.0 || !Round::is_of(on.contact(point))) {
+                point.meet(on.rows);
+            }
         }
     }
 
     /// Solves a point, if it approaches fast enough or was hit before.
     fn visit(&mut self, on: &mut SpreadInput<'_>, place: usize, bounces: bool) {
         let point = &mut self.points[place];
-        if point.mass <= 0.0 || point.role == Role::Left && bounces {
+        if !point.exists || point.role == Role::Left && bounces {
             return;
         }
         let mut touch = None;
@@ -396,7 +390,7 @@ impl Spread {
                 // In the next wave.
                 return;
             }
-            if let Some(round) = point.round.filter(|_| on.timed) {
+            if let Some(round) = on.round(point) {
                 let ends = point.rows.map(|row| &on.rows[row as usize]);
                 touch = round.frame(ends, [-on.dt, on.dt]);
             }
@@ -405,13 +399,12 @@ impl Spread {
                 turned.turn(frame, on.rows);
                 let Some(then) = arrival(&turned, on, self.slowest) else { return };
                 (*point, time) = (turned, then);
-                point.round = None;
                 on.turn(point, frame);
                 on.fall(point);
             }
             point.time = if time < -on.dt || !on.timed { 0.0 } else { time };
             (point.role, point.target) = (Role::Stops, 0.0);
-            (point.impulse, point.begun) = ([0.0; 2], [0.0; 2]);
+            point.impulse = [0.0; 2];
         }
         self.meet(on, place);
         let point = &mut self.points[place];
@@ -431,6 +424,14 @@ impl Spread {
         if point.k[0] * (delta[0].abs() + delta[1].abs()) <= self.slowest {
             return;
         }
+        self.change(on, place, new);
+    }
+
+    /// Changes the impulses of a point (N·s), at the time of its impact.
+    fn change(&mut self, on: &mut SpreadInput<'_>, place: usize, new: [f32; 2]) {
+        let point = &mut self.points[place];
+        let delta = [new[0] - point.impulse[0], new[1] - point.impulse[1]];
+        point.given = [point.given[0] + delta[0], point.given[1] + delta[1]];
         point.impulse = new;
         let time = point.time;
         self.push(on, place, delta, [time; 2]);
@@ -487,22 +488,22 @@ impl Spread {
 
     /// The body that represents the island of a lane.
     fn island_of(&mut self, on: &SpreadInput<'_>, lane: u32) -> u32 {
-        let (lane, lanes) = (lane as usize, on.batches[0].lanes());
-        let (part, of) = if lane < lanes { (0, lane) } else { (1, lane - lanes) };
+        let (part, of) = on.part_of(lane);
         // Body b is dynamic.
         self.islands.least(on.batches[part].row_b()[of])
     }
 
     /// Index of the first point of a lane. Adds the points of the lane to the list if they are not in it.
     fn list(&mut self, on: &SpreadInput<'_>, lane: u32) -> usize {
-        let listed = &mut self.listed[lane as usize];
+        let (first, listed) = (self.points.len(), &mut self.listed[lane as usize]);
         if *listed == NONE {
-            *listed = self.points.len() as u32;
-            let mut points = on.points(lane);
+            *listed = first as u32;
+            self.points.resize(first + 2, HitPoint::default());
+            let points = &mut self.points[first..];
+            on.read_points(lane, points);
             let [k_0, k_1] = [points[0].k[0], points[1].k[0]];
             points[0].is_tight =
-                points[1].mass > 0.0 && points[0].coupling(&points[1], on.rows).powi(2) > 0.5 * k_0 * k_1;
-            self.points.extend(points);
+                points[1].exists && points[0].coupling(&points[1], on.rows).powi(2) > 0.5 * k_0 * k_1;
         }
         *listed as usize
     }
@@ -521,7 +522,7 @@ fn arrival(point: &HitPoint, on: &SpreadInput<'_>, slowest: f32) -> Option<f32> 
 /// Whether a point approaches fast enough to bounce.
 fn will_bounce(point: &HitPoint, on: &SpreadInput<'_>) -> bool {
     let speed = -point.velocity(on.rows)[0];
-    point.restitution > 0.0 && speed > point.slow && point.restitution * speed > BOUNCES * point.slow
+    speed > point.slow && on.restitution(point) * speed > BOUNCES * point.slow
 }
 
 /// Rebound velocity of an approaching point (m/s), and the time of its impact (s); see the [module](self).
@@ -529,7 +530,7 @@ fn rebounds(point: &HitPoint, on: &SpreadInput<'_>, is_first: bool) -> Option<[f
     if !will_bounce(point, on) {
         return None;
     }
-    let (v, s, a, e) = (point.velocity(on.rows)[0], point.gap(on.rows), point.falls, point.restitution);
+    let (v, s, a, e) = (point.velocity(on.rows)[0], point.gap(on.rows), point.falls, on.restitution(point));
     let (dt, h) = (on.dt, on.h);
     // Its gap slightly after the end of the step.
     if (v - a * 0.5 * (dt + h)).mul_add(AHEAD * dt, s) >= 0.0 {

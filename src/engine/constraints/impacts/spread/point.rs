@@ -37,12 +37,15 @@ pub(super) enum Role {
     Left,
 }
 
-/// A contact point that may be hit.
+/// A contact point that may be hit, in two cache lines.
 #[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
 pub(super) struct HitPoint {
     pub lane: u32,
-    pub index: u32,
-    pub contact: u32,
+    /// Number of the point in its contact.
+    pub index: u8,
+    /// Whether the contact has this point, and it can push.
+    pub exists: bool,
     /// Rows of a and b.
     pub rows: [u32; 2],
     /// Impulses change a.
@@ -53,11 +56,7 @@ pub(super) struct HitPoint {
     pub own_arms: [[f32; 2]; 2],
     /// k_nn, k_tt, k_nt (1/kg).
     pub k: [f32; 3],
-    /// The normal mass of its record (kg); zero for a missing point.
-    pub mass: f32,
     pub friction: f32,
-    /// Coefficient of restitution (1).
-    pub restitution: f32,
     pub role: Role,
     /// Target of v_n in this wave (m/s).
     pub target: f32,
@@ -69,20 +68,15 @@ pub(super) struct HitPoint {
     pub slow: f32,
     /// Gap at the beginning of the step (m).
     pub separation: f32,
-    /// Impulses along n and t so far (N·s), those at the beginning of the wave, and those of earlier waves.
+    /// Impulses along n and t (N·s) in its present role, and in all waves.
     pub impulse: [f32; 2],
-    pub begun: [f32; 2],
     pub given: [f32; 2],
-    /// Impulses of the last substep, along both (N·s).
-    pub borne: [f32; 2],
     /// Time of its impact (s).
     pub time: f32,
     /// Displacement of b relative to a for which the arms end at one point (m).
     pub apart: [f32; 2],
-    /// Its round shapes, until it is hit.
-    pub round: Option<Round>,
-    /// Whether a shape is round.
-    pub is_round: bool,
+    /// Whether it has the frame of its time of touch, see [`HitPoint::turn`].
+    pub is_turned: bool,
     /// On the first point: whether its coupling with the second is strong.
     pub is_tight: bool,
 }
@@ -127,13 +121,21 @@ pub(super) struct LanePlace {
     pub pushes_a: bool,
 }
 
+const _: () = assert!(size_of::<HitPoint>() == 128);
+
 impl SpreadInput<'_> {
-    pub(super) fn place(&self, lane: u32) -> LanePlace {
+    /// Which batches a lane is in, and its lane in these.
+    pub(super) fn part_of(&self, lane: u32) -> (usize, usize) {
         let (lane, lanes) = (lane as usize, self.batches[0].lanes());
-        let (part, of) = if lane < lanes { (0, lane) } else { (1, lane - lanes) };
+        if lane < lanes { (0, lane) } else { (1, lane - lanes) }
+    }
+
+    pub(super) fn place(&self, lane: u32) -> LanePlace {
+        let (part, of) = self.part_of(lane);
         let (batches, width) = (&self.batches[part], self.batches[part].width());
-        let holds = |s: &&Segment| (s.first_lane..s.first_lane + s.batches * width).contains(&of);
-        let segment = batches.segments().iter().find(holds).expect("a segment for each lane");
+        let segments = batches.segments();
+        let after = segments.partition_point(|s: &Segment| s.first_lane <= of);
+        let segment = &segments[after - 1];
         let in_segment = of - segment.first_lane;
         let vector = segment.first_vector + in_segment / width * segment.stride;
         let layout = Layout::for_features(self.features, segment.opposite);
@@ -160,7 +162,7 @@ impl SpreadInput<'_> {
         let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
         let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
         let put = |vector: usize, value: f32| floats[first + vector * width] = value;
-        write_arms(&layout, point.index as usize, point.arms, [1.0 / point.k[0], 1.0 / point.k[1]], put);
+        write_arms(&layout, point.index.into(), point.arms, [1.0 / point.k[0], 1.0 / point.k[1]], put);
     }
 
     /// Removes the overlap of a point that has bounced from its record: it separates without a push.
@@ -168,14 +170,14 @@ impl SpreadInput<'_> {
         let raised = point.gap(self.rows).min(0.0);
         let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
         let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
-        floats[first + layout.at(point.index as usize, layout.separation) * width] -= raised;
+        floats[first + layout.at(point.index.into(), layout.separation) * width] -= raised;
     }
 
     /// Removes a point's load.
     pub(super) fn release(&mut self, point: &HitPoint) {
         let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
         let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
-        let mut forget = |of: usize| floats[first + layout.at(point.index as usize, of) * width] = 0.0;
+        let mut forget = |of: usize| floats[first + layout.at(point.index.into(), of) * width] = 0.0;
         forget(layout.normal_impulse);
         if layout.has_friction {
             forget(layout.tangent_impulse);
@@ -193,22 +195,51 @@ impl SpreadInput<'_> {
         (point.falls, point.slow) = (a - b, self.dt * (a.abs() + b.abs()).max(least));
     }
 
-    /// The points of a lane.
-    pub(super) fn points(&self, lane: u32) -> [HitPoint; 2] {
+    /// Whether a point of a contact with round shapes can have the frame of its time of touch; see [`Round`].
+    pub(super) fn round(&self, point: &HitPoint) -> Option<Round> {
+        if !self.timed || point.is_turned {
+            return None;
+        }
+        Round::of(self.contact(point), !point.pushes_a)
+    }
+
+    /// The contact of a point.
+    pub(super) fn contact(&self, point: &HitPoint) -> &Contact {
+        &self.contacts[self.contact_of(point.lane)]
+    }
+
+    /// Index of the contact of a lane.
+    pub(super) fn contact_of(&self, lane: u32) -> usize {
+        let (part, of) = self.part_of(lane);
+        self.batches[part].contact()[of] as usize
+    }
+
+    /// Coefficient of restitution of a point (1).
+    pub(super) fn restitution(&self, point: &HitPoint) -> f32 {
+        if self.bounces { self.contact(point).restitution } else { 0.0 }
+    }
+
+    /// Impulses of a point along n and t in the last substep (N·s).
+    pub(super) fn borne(&self, point: &HitPoint) -> [f32; 2] {
+        let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
+        let floats: &[f32] = bytemuck::cast_slice(self.batches[part].records());
+        let at = |quantity: usize| floats[first + layout.at(point.index.into(), quantity) * width];
+        [at(layout.normal_impulse), if layout.has_friction { at(layout.tangent_impulse) } else { 0.0 }]
+    }
+
+    /// Fills in the points of a lane; those that it does not have are unchanged.
+    pub(super) fn read_points(&self, lane: u32, points: &mut [HitPoint]) {
         let LanePlace { part, of, width, first, layout, pushes_a } = self.place(lane);
         let batches = &self.batches[part];
         let floats: &[f32] = bytemuck::cast_slice(batches.records());
-        let contact = batches.contact()[of];
-        let restitution = if self.bounces { self.contacts[contact as usize].restitution } else { 0.0 };
         let rows = [batches.row_a()[of], batches.row_b()[of]];
         let at = |quantity: usize| floats[first + quantity * width];
-        std::array::from_fn(|p| {
-            let is_there = p < layout.points;
-            let mass = if is_there { at(layout.at(p, layout.normal_mass)) } else { 0.0 };
-            let mut point =
-                HitPoint { lane, contact, rows, pushes_a, mass, index: p as u32, ..HitPoint::default() };
+        let normal = [at(0), at(1)];
+        for (p, point) in points.iter_mut().enumerate().take(layout.points) {
+            (point.lane, point.rows, point.pushes_a, point.index) = (lane, rows, pushes_a, p as u8);
+            let mass = at(layout.at(p, layout.normal_mass));
             if mass <= 0.0 {
-                return point;
+                continue;
             }
             let arm = |arm: usize, has: bool| {
                 if has { [at(layout.at(p, arm)), at(layout.at(p, arm) + 1)] } else { [0.0; 2] }
@@ -218,18 +249,13 @@ impl SpreadInput<'_> {
                 |body: usize| self.rows[rows[body] as usize].delta[3] * arms[body][0] * arms[body][1];
             let k_nt = inertia(1) + if pushes_a { inertia(0) } else { 0.0 };
             let k_tt = if layout.has_friction { 1.0 / at(layout.at(p, layout.tangent_mass)) } else { 1.0 };
-            (point.normal, point.arms, point.own_arms) = ([at(0), at(1)], arms, arms);
+            (point.normal, point.arms, point.own_arms) = (normal, arms, arms);
             point.k = [1.0 / mass, k_tt, k_nt];
             point.friction = if layout.has_friction { at(layout.friction) } else { 0.0 };
-            let tangent = if layout.has_friction { at(layout.at(p, layout.tangent_impulse)) } else { 0.0 };
-            point.borne = [at(layout.at(p, layout.normal_impulse)), tangent];
-            point.restitution = restitution;
             point.separation = at(layout.at(p, layout.separation));
-            self.fall(&mut point);
-            point.round = Round::of(&self.contacts[contact as usize], !pushes_a);
-            point.is_round = point.round.is_some();
-            point
-        })
+            point.exists = true;
+            self.fall(point);
+        }
     }
 }
 
@@ -280,7 +306,7 @@ impl HitPoint {
     pub(super) fn turn(&mut self, frame: &TouchFrame, rows: &[BodyRow]) {
         let k = couplings(self.rows.map(|row| &rows[row as usize]), frame.arms);
         (self.normal, self.arms, self.own_arms) = (frame.normal.to_array(), frame.arms, frame.arms);
-        (self.k, self.separation) = (k, frame.separation);
+        (self.k, self.separation, self.is_turned) = (k, frame.separation, true);
         let [a, b] = self.rows.map(|row| rows[row as usize]);
         let apart = |k: usize| frame.time.mul_add(b.velocity[k] - a.velocity[k], b.delta[k] - a.delta[k]);
         self.apart = [apart(0), apart(1)];
@@ -289,10 +315,6 @@ impl HitPoint {
     /// Moves the point to the middle between the positions of both bodies at its time; see the
     /// [module](super).
     pub fn meet(&mut self, rows: &[BodyRow]) {
-        // Nothing turns a smooth disc.
-        if !self.pushes_a || self.friction == 0.0 && self.is_round {
-            return;
-        }
         let [a, b] = self.rows.map(|row| rows[row as usize]);
         let apart = |k: usize| {
             self.time.mul_add(b.velocity[k] - a.velocity[k], b.delta[k] - a.delta[k]) - self.apart[k]
