@@ -79,7 +79,7 @@ impl Batches {
         self.width
     }
 
-    /// All segments, in the order in which they were pushed.
+    /// All segments, in the order of their stages.
     pub fn segments(&self) -> &[Segment] {
         &self.segments
     }

@@ -133,9 +133,9 @@ impl SpreadInput<'_> {
     pub(super) fn place(&self, lane: u32) -> LanePlace {
         let (part, of) = self.part_of(lane);
         let (batches, width) = (&self.batches[part], self.batches[part].width());
-        let segments = batches.segments();
-        let after = segments.partition_point(|s: &Segment| s.first_lane <= of);
-        let segment = &segments[after - 1];
+        // They are in the order of sweeps, not of lanes.
+        let holds = |s: &&Segment| (s.first_lane..s.first_lane + s.batches * width).contains(&of);
+        let segment = batches.segments().iter().find(holds).expect("a segment for each lane");
         let in_segment = of - segment.first_lane;
         let vector = segment.first_vector + in_segment / width * segment.stride;
         let layout = Layout::for_features(self.features, segment.opposite);
