@@ -102,7 +102,7 @@ pub enum Maker {
     Rapier,
     /// `soft_step` of this crate at this width, with this broad phase.
     Simpulse(LaneWidth, BroadPhaseKind),
-    /// Another solver of this crate at its own parameters, at the width of the CPU.
+    /// Another solver of this crate at its own settings.
     Solver(&'static str),
 }
 
@@ -128,7 +128,7 @@ impl Contender {
         match self.maker {
             Maker::Box2d => "Box2D x8".into(),
             Maker::Rapier => "rapier x8".into(),
-            Maker::Solver(name) => format!("our {name} x{}", native_width().lanes()),
+            Maker::Solver(name) => format!("our {name}"),
             Maker::Simpulse(width, BroadPhaseKind::HashGrid) => format!("simpulse x{} grid", width.lanes()),
             Maker::Simpulse(width, _) => format!("simpulse x{}", width.lanes()),
         }

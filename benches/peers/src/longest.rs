@@ -18,11 +18,12 @@ use std::path::PathBuf;
 const LIMIT: f64 = 2.0;
 
 /// Engines at their defaults. The first is the reference.
-const ENGINES: [(&str, Contender); 3] = {
+const ENGINES: [(&str, Contender); 4] = {
     let own = Contender { maker: Maker::Box2d, substeps: 4, hertz: 30.0, recycling: true, continuous: true };
     [
         ("Box2D", own),
         ("rapier", Contender { maker: Maker::Rapier, continuous: false, ..own }),
+        ("soft_step", Contender { maker: Maker::Solver("soft_step"), continuous: false, ..own }),
         ("shim", Contender { maker: Maker::Solver("shim"), ..own }),
     ]
 };
@@ -84,7 +85,7 @@ pub fn compare(campaign: &Campaign, repeats: u32, log: Option<&PathBuf>) -> Resu
     let (mut rows, mut refused) = (Vec::new(), 0);
     for (family, number) in campaign.list() {
         let case = family.case(campaign.seed, number);
-        let mut steps = ENGINES.map(|_| Ok(Vec::new()));
+        let mut steps = ENGINES.map(|_| Ok::<_, String>(Vec::new()));
         for _ in 0..repeats {
             for ((_, contender), steps) in ENGINES.iter().zip(&mut steps) {
                 if let Ok(least) = steps
@@ -94,16 +95,16 @@ pub fn compare(campaign: &Campaign, repeats: u32, log: Option<&PathBuf>) -> Resu
                 }
             }
         }
-        let [Ok(a), Ok(b), Ok(c)] = &steps else {
+        let timed: Result<Vec<_>, _> = steps.into_iter().collect();
+        let Ok(timed) = timed else {
             refused += 1;
             continue;
         };
-        let scene = [a, b, c].map(|steps| steps.as_slice());
-        let mut engine = 0;
-        let scene = scene.map(|steps| {
-            engine += 1;
-            Row::of(family.name, number, ENGINES[engine - 1].0, steps)
-        });
+        let scene: Vec<Row> = ENGINES
+            .iter()
+            .zip(&timed)
+            .map(|((engine, _), steps)| Row::of(family.name, number, engine, steps))
+            .collect();
         if let Some(csv) = &mut csv {
             scene
                 .iter()
@@ -122,7 +123,7 @@ pub fn compare(campaign: &Campaign, repeats: u32, log: Option<&PathBuf>) -> Resu
 }
 
 /// One line per family and engine, then all families together.
-fn table(families: &[&'static Family], rows: &[[Row; ENGINES.len()]]) -> Table {
+fn table(families: &[&'static Family], rows: &[Vec<Row>]) -> Table {
     let mut table = Table::new();
     table.load_style(UTF8_FULL_CONDENSED);
     let over = format!("over {LIMIT}");

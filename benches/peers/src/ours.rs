@@ -4,7 +4,7 @@
 use crate::engine::{Contender, Engine, Stage, State};
 use simpulse::engine::broadphase::BroadPhaseKind;
 use simpulse::engine::clock::Phase;
-use simpulse::engine::lanes::{LaneWidth, native_width};
+use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers;
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes::Scene;
@@ -29,12 +29,11 @@ impl Simpulse {
         Ok(Simpulse(scene.build(settings).map_err(|e| e.to_string())?))
     }
 
-    /// Runs another solver at the width of the CPU and at its own parameters. Errors: as above, or an unknown
-    /// solver.
+    /// Runs another solver at its own settings; it uses fewer lanes where a scene cannot fill them. Errors: as above, or
+    /// an unknown solver.
     pub fn of(scene: &Scene, name: &str, contender: &Contender) -> Result<Self, String> {
         let solver = solvers::find(name).map_err(|e| e.to_string())?;
-        let own = Settings::new(solver).exactly(native_width());
-        let mut settings = Settings { continuous: contender.continuous, ..own };
+        let mut settings = Settings { continuous: contender.continuous, ..Settings::new(solver) };
         settings.budget.substeps = contender.substeps;
         Ok(Simpulse(scene.build(settings).map_err(|e| e.to_string())?))
     }
