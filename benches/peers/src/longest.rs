@@ -12,6 +12,7 @@ use simpulse::engine::solvers;
 use simpulse::lab::study::sample::quantile;
 use simpulse::lab::torture::families::Family;
 use simpulse::lab::torture::{Campaign, TortureCase, substeps};
+use std::io::IsTerminal;
 use std::path::PathBuf;
 
 /// Limit on the longest step, as a multiple of Box2D's in the same scene (1).
@@ -83,7 +84,11 @@ pub fn compare(campaign: &Campaign, repeats: u32, log: Option<&PathBuf>) -> Resu
     let failed = |e: csv::Error| format!("{}: {e}", log.map_or(String::new(), |p| p.display().to_string()));
     let mut csv = log.map(csv::Writer::from_path).transpose().map_err(failed)?;
     let (mut rows, mut refused) = (Vec::new(), 0);
-    for (family, number) in campaign.list() {
+    let scenes = campaign.list();
+    for (k, &(family, number)) in scenes.iter().enumerate() {
+        if std::io::stderr().is_terminal() {
+            eprint!("\r{} of {} scenes ", k + 1, scenes.len());
+        }
         let case = family.case(campaign.seed, number);
         let mut steps = ENGINES.map(|_| Ok::<_, String>(Vec::new()));
         for _ in 0..repeats {
