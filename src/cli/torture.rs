@@ -163,9 +163,7 @@ pub fn run(args: &TortureArgs) -> Result<ExitCode, Error> {
 
 fn chosen(args: &TortureArgs) -> Result<Vec<(&'static Family, u32)>, Error> {
     let Some(only) = &args.only else {
-        let all = || FAMILIES.iter().collect();
-        let families = if args.families.is_empty() { all() } else { args.families.clone() };
-        return Ok(Campaign { seed: args.seed, families, scenes: args.scenes }.list());
+        return Ok(Campaign::new(args.seed, &args.families, args.scenes).list());
     };
     let invalid = || Error::invalid("--only", format!("'{only}' is not FAMILY:NUMBER, such as 'drops:17'"));
     let (name, number) = only.split_once(':').ok_or_else(invalid)?;

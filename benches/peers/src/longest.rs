@@ -4,30 +4,28 @@
 //! minimum over them. The answers are checked by [`crate::torture`].
 
 use crate::engine::{Contender, Maker};
-use crate::race::build;
-use comfy_table::{Table, presets::UTF8_FULL_CONDENSED};
+use crate::table::head;
+use crate::torture::{contender, start};
+use comfy_table::Table;
 use serde::Serialize;
 use simpulse::engine::clock::timed;
-use simpulse::engine::solvers;
+use simpulse::lab::study::pace::keep_least;
 use simpulse::lab::study::sample::quantile;
 use simpulse::lab::torture::families::Family;
-use simpulse::lab::torture::{Campaign, TortureCase, substeps};
+use simpulse::lab::torture::{Campaign, TortureCase};
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::Path;
 
 /// Limit on the longest step, as a multiple of Box2D's in the same scene (1).
 const LIMIT: f64 = 2.0;
 
 /// Engines at their defaults. The first is the reference.
-const ENGINES: [(&str, Contender); 4] = {
-    let own = Contender { maker: Maker::Box2d, substeps: 4, hertz: 30.0, recycling: true, continuous: true };
-    [
-        ("Box2D", own),
-        ("rapier", Contender { maker: Maker::Rapier, continuous: false, ..own }),
-        ("soft_step", Contender { maker: Maker::Solver("soft_step"), continuous: false, ..own }),
-        ("shim", Contender { maker: Maker::Solver("shim"), ..own }),
-    ]
-};
+const ENGINES: [(&str, Contender); 4] = [
+    ("Box2D", contender(Maker::Box2d, 4, true)),
+    ("rapier", contender(Maker::Rapier, 4, false)),
+    ("soft_step", contender(Maker::Solver("soft_step"), 4, false)),
+    ("shim", contender(Maker::Solver("shim"), 14, true)),
+];
 
 /// Times of the steps of a scene in an engine (µs).
 #[derive(Serialize)]
@@ -56,21 +54,10 @@ impl Row {
 /// Runs a case to its end, or until the engine reports that it diverged. Keeps the shorter time of each step
 /// (µs). Errors: a part of the scene that the engine does not support.
 fn run(case: &TortureCase, contender: &Contender, least: &mut Vec<f64>) -> Result<(), String> {
-    let own = match contender.maker {
-        Maker::Solver(name) => {
-            let solver = solvers::find(name).map_err(|e| e.to_string())?;
-            substeps(case, solver, solver.budget.substeps)
-        }
-        _ => case.substeps.unwrap_or(contender.substeps),
-    };
-    let mut engine = build(&Contender { substeps: own, ..*contender }, &case.scene)?;
+    let mut engine = start(case, contender)?;
     for step in 0..case.scene.steps as usize {
         let (stepped, took) = timed(|| engine.step());
-        let us = 1e6 * took.as_secs_f64();
-        match least.get_mut(step) {
-            None => least.push(us),
-            Some(least) => *least = us.min(*least),
-        }
+        keep_least(least, step, 1e6 * took.as_secs_f64());
         if stepped.is_err() {
             break;
         }
@@ -80,7 +67,7 @@ fn run(case: &TortureCase, contender: &Contender, least: &mut Vec<f64>) -> Resul
 
 /// Times the scenes of a campaign `repeats` times in each engine and prints a table; writes the rows of all
 /// scenes to a CSV file. Errors: the file.
-pub fn compare(campaign: &Campaign, repeats: u32, log: Option<&PathBuf>) -> Result<(), String> {
+pub fn compare(campaign: &Campaign, repeats: u32, log: Option<&Path>) -> Result<(), String> {
     let failed = |e: csv::Error| format!("{}: {e}", log.map_or(String::new(), |p| p.display().to_string()));
     let mut csv = log.map(csv::Writer::from_path).transpose().map_err(failed)?;
     let (mut rows, mut refused) = (Vec::new(), 0);
@@ -129,20 +116,8 @@ pub fn compare(campaign: &Campaign, repeats: u32, log: Option<&PathBuf>) -> Resu
 
 /// One line per family and engine, then all families together.
 fn table(families: &[&'static Family], rows: &[Vec<Row>]) -> Table {
-    let mut table = Table::new();
-    table.load_style(UTF8_FULL_CONDENSED);
     let over = format!("over {LIMIT}");
-    table.set_header([
-        "family",
-        "engine",
-        "scenes",
-        "longest",
-        "99 %",
-        "most",
-        over.as_str(),
-        "mean",
-        "most",
-    ]);
+    let mut table = head(&["family", "engine", "scenes", "longest", "99 %", "most", &over, "mean", "most"]);
     for family in families.iter().map(|f| f.name).chain(["all"]) {
         for engine in 1..ENGINES.len() {
             let own = || rows.iter().filter(|scene| scene[0].family == family || family == "all");

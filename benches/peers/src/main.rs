@@ -27,7 +27,7 @@ mod torture;
 
 use clap::Parser;
 use simpulse::lab::torture::Campaign;
-use simpulse::lab::torture::families::{FAMILIES, Family};
+use simpulse::lab::torture::families::Family;
 use std::path::PathBuf;
 
 /// Scenes of the race, their number of steps, and whether nothing in them may fall.
@@ -99,11 +99,9 @@ fn main() {
 
 fn run(args: &Args) -> Result<(), String> {
     if let Some(scenes) = args.torture {
-        let families =
-            if args.families.is_empty() { FAMILIES.iter().collect() } else { args.families.clone() };
-        let campaign = Campaign { seed: args.seed.unwrap_or(1), families, scenes };
+        let campaign = Campaign::new(args.seed.unwrap_or(1), &args.families, scenes);
         return match args.pace {
-            Some(repeats) => longest::compare(&campaign, repeats, args.log.as_ref()),
+            Some(repeats) => longest::compare(&campaign, repeats, args.log.as_deref()),
             None => torture::run(&campaign),
         };
     }

@@ -259,7 +259,8 @@ impl Row {
     }
 }
 
-fn head(names: &[&str]) -> Table {
+/// An empty table with these columns.
+pub fn head(names: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(UTF8_FULL_CONDENSED).set_header(names.to_vec());
     table

@@ -18,31 +18,38 @@ impl torture::Engine for Judged {
     }
 }
 
-/// Every engine at its defaults, and with the opposite setting of continuous collision.
-fn engines() -> Vec<(&'static str, Contender)> {
-    let own = |maker, continuous| Contender { maker, substeps: 4, hertz: 30.0, recycling: true, continuous };
-    vec![
-        ("Box2D", own(Maker::Box2d, true)),
-        ("Box2D, not continuous", own(Maker::Box2d, false)),
-        ("rapier", own(Maker::Rapier, false)),
-        ("rapier, continuous", own(Maker::Rapier, true)),
-    ]
+/// An engine with this number of substeps and otherwise at its defaults, but for continuous collision.
+pub const fn contender(maker: Maker, substeps: u32, continuous: bool) -> Contender {
+    Contender { maker, substeps, hertz: 30.0, recycling: true, continuous }
 }
 
-/// Runs one case in one engine. Errors: a part of the scene that the engine does not support.
+/// Every engine at its defaults, and with the opposite setting of continuous collision.
+const ENGINES: [(&str, Contender); 4] = [
+    ("Box2D", contender(Maker::Box2d, 4, true)),
+    ("Box2D, not continuous", contender(Maker::Box2d, 4, false)),
+    ("rapier", contender(Maker::Rapier, 4, false)),
+    ("rapier, continuous", contender(Maker::Rapier, 4, true)),
+];
+
+/// The engine with the scene and the number of substeps of a case. Errors: a part of the scene that the engine does
+/// not support.
+pub fn start(case: &TortureCase, contender: &Contender) -> Result<Box<dyn Engine>, String> {
+    let substeps = case.substeps.unwrap_or(contender.substeps);
+    build(&Contender { substeps, ..*contender }, &case.scene)
+}
+
+/// Runs one case in one engine. Errors: as above.
 fn one(case: &TortureCase, contender: &Contender) -> Result<CaseOutcome, String> {
-    let contender = Contender { substeps: case.substeps.unwrap_or(contender.substeps), ..*contender };
-    let mut engine = Judged(build(&contender, &case.scene)?);
-    torture::run(case, &mut engine).map_err(|e| e.to_string())
+    torture::run(case, &mut Judged(start(case, contender)?)).map_err(|e| e.to_string())
 }
 
 /// Prints the table by family. Runs on one thread, because Box2D keeps its worlds in a list without a lock.
 /// Errors: none from an engine; scenes that it does not support are counted.
 pub fn run(campaign: &Campaign) -> Result<(), String> {
-    let (engines, seed, mut rows, mut refused) = (engines(), campaign.seed, Vec::new(), 0);
+    let (seed, mut rows, mut refused) = (campaign.seed, Vec::new(), 0);
     for (family, number) in campaign.list() {
         let case = family.case(seed, number);
-        for (name, contender) in &engines {
+        for (name, contender) in &ENGINES {
             let (family, solver) = (family.name.to_string(), name.to_string());
             match one(&case, contender) {
                 Ok(outcome) => rows.push(TortureRow { seed, family, number, solver, outcome }),
@@ -53,7 +60,7 @@ pub fn run(campaign: &Campaign) -> Result<(), String> {
             }
         }
     }
-    let names: Vec<String> = engines.iter().map(|(name, _)| name.to_string()).collect();
+    let names: Vec<String> = ENGINES.iter().map(|(name, _)| name.to_string()).collect();
     println!("{}{refused} runs refused", table::text(&table::lines(&rows, &names)));
     Ok(())
 }

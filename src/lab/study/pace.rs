@@ -41,12 +41,9 @@ impl Pace {
             for step in 0..steps as usize {
                 let (stepped, took) = timed(|| world.step());
                 let ns = took.as_nanos() as f64;
-                match times.get_mut(step) {
-                    None => {
-                        times.push(ns);
-                        contacts.push(world.counts.contacts);
-                    }
-                    Some(least) => *least = ns.min(*least),
+                keep_least(&mut times, step, ns);
+                if step == contacts.len() {
+                    contacts.push(world.counts.contacts);
                 }
                 if stepped.is_err() {
                     break;
@@ -79,6 +76,15 @@ impl Pace {
             longest_step: longest_step as u32 + 1,
             mean: ratios.iter().sum::<f64>() / ratios.len().max(1) as f64,
         }
+    }
+}
+
+/// Keeps the time of a step if it is the first, or shorter than those of earlier runs.
+#[doc(hidden)]
+pub fn keep_least(times: &mut Vec<f64>, step: usize, time: f64) {
+    match times.get_mut(step) {
+        None => times.push(time),
+        Some(least) => *least = time.min(*least),
     }
 }
 

@@ -180,13 +180,19 @@ pub struct TortureRow {
 pub struct Campaign {
     /// Seed from which all scenes are drawn.
     pub seed: u64,
-    /// Families, in the order of [`FAMILIES`].
+    /// Families; see [`Campaign::new`].
     pub families: Vec<&'static Family>,
     /// Number of scenes over all families.
     pub scenes: u32,
 }
 
 impl Campaign {
+    /// A campaign over these families, or over all of them if none are given.
+    pub fn new(seed: u64, families: &[&'static Family], scenes: u32) -> Self {
+        let families = if families.is_empty() { FAMILIES.iter().collect() } else { families.to_vec() };
+        Campaign { seed, families, scenes }
+    }
+
     /// Family and number of each scene, families in turn.
     pub fn list(&self) -> Vec<(&'static Family, u32)> {
         let count = self.families.len().max(1) as u32;
@@ -259,8 +265,7 @@ mod tests {
 
     #[test]
     fn families_take_turns_and_numbers_grow() {
-        let families = vec![&FAMILIES[0], &FAMILIES[3]];
-        let list = Campaign { seed: 1, families, scenes: 5 }.list();
+        let list = Campaign::new(1, &[&FAMILIES[0], &FAMILIES[3]], 5).list();
         let named: Vec<_> = list.iter().map(|(f, n)| (f.name, *n)).collect();
         let [a, b] = [FAMILIES[0].name, FAMILIES[3].name];
         assert_eq!(named, [(a, 0), (b, 0), (a, 1), (b, 1), (a, 2)]);
