@@ -47,6 +47,26 @@ use serde_json::{Value, json};
 use std::io::ErrorKind;
 use std::process::ExitCode;
 
+/// Commands of earlier versions, and what does the same now.
+const FORMER: [(&str, &str); 16] = [
+    ("merge", "study --merge DIR…"),
+    ("report", "study --from DIR"),
+    ("savings", "study --features all"),
+    ("growth", "study --sweep size=…"),
+    ("snapshot", "run SCENE --picture FILE.svg"),
+    ("replay", "run SCENE --solvers A,B --record FILE.html"),
+    ("capture", "converge SCENE --freeze FILE"),
+    ("ablate", "verify --without all"),
+    ("torture", "verify --random N"),
+    ("agree", "cargo test --release --test lab agree"),
+    ("papers", "cargo test --release --test lab papers"),
+    ("scenes", "list scenes"),
+    ("scene", "list SCENE"),
+    ("solvers", "list solvers"),
+    ("columns", "list columns"),
+    ("schema", "list schema"),
+];
+
 /// Parses the command line, runs the command and prints the result. See the [module](self) for exit codes.
 pub fn main() -> ExitCode {
     interrupt::install();
@@ -58,7 +78,7 @@ pub fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         Err(error) => {
-            let message = empty(&error).unwrap_or_else(|| error.to_string());
+            let message = former(&error).or(empty(&error)).unwrap_or_else(|| error.to_string());
             note(&format!("error: {}\n", one_line(&message)));
             return ExitCode::from(2);
         }
@@ -110,6 +130,14 @@ fn full_study(args: &study::StudyArgs) -> Result<ExitCode, Error> {
         note(&format!("{line}\n"));
     }
     Ok(code)
+}
+
+/// The message for a command of an earlier version; `None` for other errors.
+fn former(error: &clap::Error) -> Option<String> {
+    let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand) else { return None };
+    let (name, now) = FORMER.iter().find(|(name, _)| name == word)?;
+    let command = if now.starts_with("cargo") { now.to_string() } else { format!("simpulse {now}") };
+    Some(format!("'{name}' is now: {command}"))
 }
 
 /// The message for an empty option value; `None` for other errors. clap has several messages for this case,

@@ -422,8 +422,10 @@ impl Observation {
         }
     }
 
-    /// Records a point of a pair that had no contact in this step; returns its depth (m).
-    fn fly(&mut self, key: u64, depth: f64) -> f64 {
+    /// Records a point of a pair that had no contact in this step; returns its depth (m). A gap is no overlap:
+    /// counted as a negative depth, it would be added to the depth at which the bodies meet.
+    fn fly(&mut self, key: u64, signed_depth: f64) -> f64 {
+        let depth = signed_depth.max(0.0);
         self.flight_max = self.flight_max.max(depth);
         let flight = self.flights.entry(key).or_insert((0.0, self.steps));
         *flight = (if flight.1 == self.steps { flight.0.max(depth) } else { depth }, self.steps);
