@@ -253,7 +253,7 @@ fn parted(symmetry: &Symmetry, variant: &'static Variant, scenes: u32) -> u32 {
     (0..scenes).filter(apart).count() as u32
 }
 
-/// The table of papers/shim.md. A sample of [`SCENES`] is too small for what occurs once in a hundred scenes.
+/// Counts by symmetry and solver. A sample of [`SCENES`] is too small for what occurs once in a hundred scenes.
 #[test]
 #[ignore = "half a minute; prints a table and checks nothing"]
 fn symmetries_of_720_scenes() {
