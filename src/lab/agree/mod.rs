@@ -253,7 +253,7 @@ impl Agreement {
         };
         format!(
             "**Agreement.** The source at its best: {best}. Here: {ours}. Apart from {kind}{without} by less than {bound:.0e}{why}: \
-             `simpulse agree --solvers {solver}`.{departs}"
+             `cargo test --release --test lab agree`.{departs}"
         )
     }
 }
