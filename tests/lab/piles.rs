@@ -158,7 +158,7 @@ fn piles_that_begin_at_rest_create_no_energy() {
 }
 
 /// Cards start up to 2 mm inside each other, and those above with air below them. In each step length they land
-/// differently, and the highest pair may tip: at 29 of the rates from 30 to 499 (2026-11-27), here at 4 of 47,
+/// differently, and the highest pair may tip: at 29 of the rates from 30 to 499, here at 4 of 47,
 /// at 9 without impacts.
 #[test]
 fn a_house_of_cards_that_begins_in_itself_stands_at_most_steps() {
