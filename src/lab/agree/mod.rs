@@ -233,7 +233,7 @@ impl Agreement {
     /// The **Agreement** paragraph of the solver's docs. It follows from the table and the measurements in
     /// `f64` alone.
     fn section(&self, without: &[&str]) -> String {
-        let Agreement { solver, best, ours, bound, why, unit, .. } = self;
+        let Agreement { best, ours, bound, why, unit, .. } = self;
         let kind = if self.curves[0].counts.len() > 1 {
             format!("the source's method in `f64` over {COUNT} {unit}")
         } else {
