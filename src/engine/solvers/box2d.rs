@@ -2,7 +2,7 @@
 //!
 //! **Source.** `catto2024box2d` (version 3.2); the rows are those of [`super::soft_step`].
 //!
-//! **Departures.** Restitution is this crate's ([`crate::engine::constraints::impacts::restitution`]), which
+//! **Departures.** Restitution is this crate's ([`crate::constraints::impacts::restitution`]), which
 //! conserves energy; Box2D returns e times the approach speed. Manifolds of bodies that hardly moved are kept
 //! as in Box2D, except those of discs (`box2d/recycle.rs`). Contacts are solved in the order of this crate's
 //! colors.
@@ -20,11 +20,11 @@
 mod recycle;
 
 use super::{Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
-use crate::engine::constraints::step::{Collision, CollisionScene};
-use crate::engine::constraints::{ImpactLaw, Passes, Solver};
-use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, LINEAR_SLOP, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
+use crate::constraints::step::{Collision, CollisionScene};
+use crate::constraints::{ImpactLaw, Passes, Solver};
+use crate::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, LINEAR_SLOP, Parameter};
 use recycle::Recycled;
 
 /// Index of `recycle_distance` among the parameters.

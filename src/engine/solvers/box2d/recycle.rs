@@ -13,11 +13,11 @@
 //! begun to touch. Discs are always collided: their points do not stay fixed on them, and their manifolds are
 //! just as cheap to find.
 
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::held;
-use crate::engine::narrowphase::batch::{NO_CONTACT, PairKind};
-use crate::engine::narrowphase::candidate::Candidates;
-use crate::engine::narrowphase::lanes::PoseRow;
+use crate::contacts::Contact;
+use crate::lanes::held;
+use crate::narrowphase::batch::{NO_CONTACT, PairKind};
+use crate::narrowphase::candidate::Candidates;
+use crate::narrowphase::lanes::PoseRow;
 use glam::Vec2;
 
 /// Cosine of the relative rotation at which a manifold is recomputed (1).
