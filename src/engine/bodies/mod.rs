@@ -151,6 +151,7 @@ impl Bodies {
     }
 
     /// Every array of floats, in the order of their declaration.
+    #[cfg(feature = "serde")]
     pub(crate) fn arrays(&self) -> [&LaneVec; 17] {
         let Bodies { position_x, position_y, position_x_lo, position_y_lo, .. } = self;
         let Bodies { rotation_cos, rotation_sin, velocity_x, velocity_y, angular_velocity, .. } = self;
@@ -177,7 +178,7 @@ impl Bodies {
         ]
     }
 
-    /// As [`Self::arrays`], mutable.
+    /// Every array of floats, mutable, in the order of their declaration.
     pub(crate) fn arrays_mut(&mut self) -> [&mut LaneVec; 17] {
         [
             &mut self.position_x,

@@ -27,7 +27,7 @@ use crate::bodies::{Bodies, BodyKind};
 use crate::broadphase::Proxy;
 use crate::contacts::Contact;
 use crate::disjoint::DisjointSets;
-use crate::lanes::{BodyRow, held};
+use crate::lanes::BodyRow;
 use crate::shapes::{Aabb, Pose, Shape};
 use advance::{Mover, impact};
 use glam::Vec2;
@@ -103,12 +103,6 @@ impl Continuous {
                 self.kinematic.extend(own);
             }
         }
-    }
-
-    /// Allocated bytes.
-    pub fn held_bytes(&self) -> usize {
-        let Continuous { safe_squared, first_shape, kinematic, fast, together, parts } = self;
-        held(safe_squared) + held(first_shape) + held(kinematic) + held(fast) + together.bytes() + held(parts)
     }
 
     /// Shortens the motion of fast bodies up to the surfaces that they would pass; returns the number of fast

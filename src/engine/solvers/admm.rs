@@ -21,7 +21,7 @@
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` times 2 passes over contacts, 4 over vectors
 //! and 1 substitution, n b operations for n = 3 rows a body in a band of b; n b²/2 of a factorization, of which a step has 1 to
-//! 4. Sweeps of a step request 10971 B per contact.
+//! 4.
 //!
 //! **Fails when** bands are wide: a pyramid of base m has b = 3 m. A small ρ is slow for sliding contacts, a
 //! large ρ for loads that are carried down a column, and a step begins with one ρ for all contacts.

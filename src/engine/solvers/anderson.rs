@@ -13,8 +13,7 @@
 //! `simpulse agree --solvers anderson`. Departures, and how far each moves the result: growth of |f| by two forgets
 //! all before it (source: keeps it): 0 %.
 //!
-//! **Cost.** That of [`super::pgs`], and after each sweep passes over 2·`depth` + 4 vectors, in lanes. Sweeps
-//! of a step request 3830 B per contact.
+//! **Cost.** That of [`super::pgs`], and after each sweep passes over 2·`depth` + 4 vectors, in lanes.
 //!
 //! **Fails when** iterations are few, or contacts open and close: the combination is exact only for
 //! linear sweeps, and clamping is not linear.

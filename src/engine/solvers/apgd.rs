@@ -14,7 +14,7 @@
 //! L from 1 (source: no scale, L₀ = |K 1|/|1|): 80 %.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` times 2 passes over
-//! vectors in lanes, one more for each step that was too long. Sweeps of a step request 12203 B per contact.
+//! vectors in lanes, one more for each step that was too long.
 //!
 //! **Fails when** anything slides: the relaxation makes the surfaces separate at µ times the sliding speed.
 //! (Clamping friction by the normal impulse has no such effect, but is no convex problem.) Also when

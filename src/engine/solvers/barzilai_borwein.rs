@@ -16,7 +16,7 @@
 //! solution of the convex relaxation): `simpulse agree --solvers barzilai_borwein`.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` times 3 passes over
-//! vectors in lanes, one more for each step that was too long. Sweeps of a step request 11275 B per contact.
+//! vectors in lanes, one more for each step that was too long.
 //!
 //! **Fails when** anything slides: the relaxation makes the surfaces separate at µ times the sliding speed.
 //! Also when there are few iterations for the height of a pile.

@@ -15,8 +15,7 @@
 //! `simpulse agree --solvers local_gs`. Departures, and how far each moves the result: 2 local iterations (source:
 //! until the contact is solved): 10 %.
 //!
-//! **Cost.** That of [`super::pgs`] with `velocity_iterations` × `local_iterations` sweeps. Sweeps of a step
-//! request 1750 B per contact.
+//! **Cost.** That of [`super::pgs`] with `velocity_iterations` × `local_iterations` sweeps.
 //!
 //! **Fails when** loads must travel far, which takes sweeps over all contacts.
 

@@ -66,11 +66,10 @@ pub mod symmetric_gs;
 pub mod tgs_ngs;
 pub mod tgs_soft;
 pub mod tgs_sticky;
-pub mod two_level;
 pub mod xpbd;
 
 /// Every solver of the crate.
-pub static VARIANTS: [&Variant; 35] = [
+pub static VARIANTS: [&Variant; 34] = [
     &projection::SOLVER,
     &pgs::SOLVER,
     &pgs_ngs::SOLVER,
@@ -105,7 +104,6 @@ pub static VARIANTS: [&Variant; 35] = [
     &rapier::SOLVER,
     &physx::SOLVER,
     &jolt::SOLVER,
-    &two_level::SOLVER,
 ];
 
 /// Solver used if none is named.

@@ -15,7 +15,7 @@
 //! and how far each moves the result: the last iteration is a plain sweep (source: goes on beyond it): 70 %.
 //!
 //! **Cost.** That of [`super::pgs`]; between iterations impulses are
-//! read, replaced and applied, 3 passes over vectors, in lanes. Sweeps of a step request 4134 B per contact.
+//! read, replaced and applied, 3 passes over vectors, in lanes.
 //!
 //! **Fails when** iterations are few or friction keeps switching: each β above 1 causes a restart, and
 //! the method degrades to Gauss–Seidel.

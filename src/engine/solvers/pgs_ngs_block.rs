@@ -13,7 +13,7 @@
 //! close and no more (source: has no approach): 100 %; position sweeps go point by point (source: in pairs): 4 times.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start, `velocity_iterations` block sweeps and
-//! `position_iterations` position sweeps. Sweeps of a step request 1263 B per contact.
+//! `position_iterations` position sweeps.
 //!
 //! **Fails when** loads must travel far: the block couples the two points of a contact, not two contacts, so
 //! convergence over a stack is that of [`super::pgs`].

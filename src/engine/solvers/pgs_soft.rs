@@ -12,7 +12,7 @@
 //! is on γ_m β s (source: on β s): 6 %.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start, `velocity_iterations` soft sweeps and, after
-//! the positions, `relax_iterations` rigid ones. Sweeps of a step request 1351 B per contact.
+//! the positions, `relax_iterations` rigid ones.
 //!
 //! **Fails when** stacks are tall: the sweeps of one step do not carry a load through them. At a third of the
 //! step rate, a spring is only as stiff as 20 Hz.

@@ -14,8 +14,7 @@
 //! `simpulse agree --solvers pgs_substeps`. Departures, and how far each moves the result: velocities are solved,
 //! with warm starts (source: positions, without, as `xpbd`): 40 times.
 //!
-//! **Cost.** Per step 1 warm start; per substep 2 body passes and `velocity_iterations` sweeps. Sweeps of a step
-//! request 3370 B per contact.
+//! **Cost.** Per step 1 warm start; per substep 2 body passes and `velocity_iterations` sweeps.
 //!
 //! **Fails when** there is only one sweep per substep. The residual of that sweep is applied again by the
 //! warm start of the next substep, and grows in pyramids (`papers/solver2d.md`); a second sweep damps it.

@@ -14,8 +14,7 @@
 //! the solution of `pgs`): `simpulse agree --solvers random_order`.
 //!
 //! **Cost.** That of [`super::pgs`], and a sort of colors (in natural order: of contacts) per sweep;
-//! in natural order records are visited out of the order of memory. Sweeps of a step request 1750 B per
-//! contact.
+//! in natural order records are visited out of the order of memory.
 //!
 //! **Fails when** [`super::pgs`] does: changes travel no further per sweep.
 

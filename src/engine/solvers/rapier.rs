@@ -16,8 +16,7 @@
 //! pairs below 10⁻³ of k₁₁ k₂₂ go row by row (source: below 10⁻²): 0 %.
 //!
 //! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations` soft block sweeps
-//! without friction and `relax_iterations` rigid block sweeps with it. Sweeps of a step request 1638 B per
-//! contact.
+//! without friction and `relax_iterations` rigid block sweeps with it.
 //!
 //! **Fails when** [`super::soft_step`] does: the block couples the two points of a contact, not two contacts.
 

@@ -22,8 +22,7 @@
 //! (Newton's method ends at the solution of its law): `simpulse agree --solvers sap`.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and up to `velocity_iterations` Newton steps, each a factorization in `f64`, one
-//! lane: 9 n b² operations for n bodies in a band of b bodies. A step in which nothing changes state takes one or two. Sweeps of a
-//! step request 103653 B per contact.
+//! lane: 9 n b² operations for n bodies in a band of b bodies. A step in which nothing changes state takes one or two.
 //!
 //! **Fails when** bodies slide: the relaxation separates the surfaces at µ times the sliding speed. When
 //! bands are wide. When iterations end early: impulses are velocities divided by `softness`, and mean

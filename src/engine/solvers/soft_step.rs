@@ -16,7 +16,7 @@
 //! quarter, 2 m/s): 90 %.
 //!
 //! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations`
-//! soft sweeps and `relax_iterations` rigid ones. Sweeps of a step request 1750 B per contact.
+//! soft sweeps and `relax_iterations` rigid ones.
 //!
 //! **Fails when** the load is large for the stiffness. At rest a contact sinks by F/(m_eff ω²), whatever the
 //! number of iterations, so tall stacks and heavy bodies on light ones sag. More substeps allow a higher

@@ -13,7 +13,7 @@
 //! arms of velocity rows are those of the start of the step (source: turned): 3 %.
 //!
 //! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations` velocity
-//! sweeps and `position_iterations` position sweeps. Sweeps of a step request 1574 B per contact.
+//! sweeps and `position_iterations` position sweeps.
 //!
 //! **Fails when** the budget is small: contacts are rigid and there is no relaxing sweep, so the residual of
 //! a sweep stays in the velocities and stacks jitter.

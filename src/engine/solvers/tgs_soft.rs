@@ -13,8 +13,7 @@
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start, `velocity_iterations` soft sweeps and
 //! `relax_iterations` rigid ones. As Jacobians move, impulses are applied again by a pass over
-//! constraints in every substep; [`super::soft_step`] needs a pass over bodies for it. Sweeps of a step request
-//! 2216 B per contact.
+//! constraints in every substep; [`super::soft_step`] needs a pass over bodies for it.
 //!
 //! **Fails when** [`super::soft_step`] does. The benefit shows only where bodies turn by more than a few
 //! degrees within a step; the cost is always paid.

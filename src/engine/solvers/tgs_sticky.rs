@@ -17,7 +17,7 @@
 //!
 //! **Cost.** Per substep 2 body passes and `velocity_iterations` sticky sweeps; per step
 //! `relax_iterations` sticky sweeps without push, 1 pass that brings drifts into the order of the lanes and 1 that
-//! books them. Sweeps of a step request 1292 B per contact.
+//! books them.
 //!
 //! **Fails when** stacks are tall: there is no warm start, so each step begins cold, and in every substep 0.8
 //! of an overlap is pushed out through velocities.
@@ -108,9 +108,5 @@ impl Solver for TgsSticky {
 
     fn boxed(&self) -> Box<dyn Solver> {
         Box::new(self.clone())
-    }
-
-    fn held_bytes(&self) -> usize {
-        self.drifts.held_bytes()
     }
 }

@@ -6,7 +6,7 @@
 
 use crate::bodies::Bodies;
 use crate::broadphase::{BroadPhase, FatBoxes, Proxy, Region};
-use crate::clock::{Clock, Phase, PhaseFilter, Timings};
+use crate::clock::{Clock, Phase, Timings};
 use crate::constraints::kernels::motion::{self, MotionInput};
 use crate::constraints::kernels::observe::ObservedRule;
 use crate::constraints::step::assign::Assignment;
@@ -31,10 +31,8 @@ mod collide;
 mod counts;
 mod edit;
 mod events;
-mod held;
 mod joints;
 mod lanes;
-mod memory;
 mod pairs;
 mod queries;
 #[cfg(feature = "serde")]
@@ -44,9 +42,7 @@ mod traits;
 
 pub use counts::{Criterion, Divergence, Quantity, StepCounts};
 pub use events::{ContactEvent, ContactPoint};
-pub use held::{HeldWorld, Probe};
 pub use joints::SolvedBlock;
-pub use memory::{Component, Memory};
 pub use queries::{Queries, RayHit};
 pub use settings::{Order, Settings};
 
@@ -298,7 +294,7 @@ impl World {
         clock.lap(Phase::Color);
         self.load_rows();
         clock.lap(Phase::Prepare);
-        let count = self.run_solver(clock, PhaseFilter::ALL);
+        let count = self.run_solver(clock);
         let WorkCount { sweeps, row_updates, impact_visits, cut_impacts, unsolved } = count;
         self.counts = StepCounts { sweeps, row_updates, impact_visits, cut_impacts, unsolved, ..self.counts };
     }
@@ -325,7 +321,7 @@ impl World {
     }
 
     /// Runs the solver's stages on the prepared rows and lanes.
-    fn run_solver(&mut self, clock: &mut Clock, phases: PhaseFilter) -> WorkCount {
+    fn run_solver(&mut self, clock: &mut Clock) -> WorkCount {
         let (s, width) = (&self.settings, self.lane_width());
         let input = StepInput {
             features: self.kernel_features(),
@@ -334,7 +330,6 @@ impl World {
             length_unit: s.length_unit,
             parameters: s.scaled_parameters(),
             without: s.without,
-            phases,
             record_impulses: s.record_impulses || s.contact_events,
             impacts: s.impact_law(),
             points: self.counts.points,

@@ -119,9 +119,4 @@ pub struct ImpactRecords {
     pub(crate) spread: spread::Spread,
 }
 
-impl ImpactRecords {
-    /// Bytes held.
-    pub fn held_bytes(&self) -> usize {
-        self.bounces.iter().map(Bounces::held_bytes).sum::<usize>() + self.spread.held_bytes()
-    }
-}
+impl ImpactRecords {}

@@ -11,7 +11,7 @@
 
 use crate::bodies::{Bodies, BodyKind};
 use crate::constraints::records::features::Features;
-use crate::lanes::{BodyRow, held};
+use crate::lanes::BodyRow;
 use glam::Vec2;
 use wide::{f32x4, f32x8};
 
@@ -117,11 +117,6 @@ impl Motion {
             self.damp.push([1.0; 4]);
         }
         self.free.resize(count + 1, [0.0; 4]);
-    }
-
-    /// Allocated bytes.
-    pub fn held_bytes(&self) -> usize {
-        held(&self.velocity_increment) + held(&self.damp) + held(&self.free) + held(&self.round)
     }
 
     /// Velocity increments in free flight per substep: `[h aₓ, h a_y, h α, 0]` per row.

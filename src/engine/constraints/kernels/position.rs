@@ -25,7 +25,7 @@
 use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, arms, spin, to_frame, turn, with_arms,
 };
-use crate::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
+use crate::constraints::kernels::pass::{Pass, PassInput, PassMode};
 use crate::constraints::kernels::stages::{for_each_batch, over_segments};
 use crate::constraints::records::batches::{Batches, Segment};
 use crate::constraints::records::features::{
@@ -48,11 +48,6 @@ pub struct PositionSweep {
 }
 
 impl Pass for PositionSweep {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        // Reads the normal; arms, separation and mass of each point.
-        PerLane::of_bodies(2 + layout.points * (layout.arms() + 2), 0, opposite)
-    }
-
     fn mode(&self) -> PassMode {
         PassMode::Position { max_correction: self.max_correction, impulses: false }
     }

@@ -13,7 +13,7 @@
 //! always uses [`Wide`], which a build lowers to the instructions that it has.
 
 use crate::constraints::records::batches::Batches;
-use crate::lanes::{Block, Lanes, held};
+use crate::lanes::{Block, Lanes};
 use wide::f32x16;
 
 /// Lanes for arithmetic on single entries.
@@ -79,11 +79,6 @@ impl PointVector {
 
     fn entries_mut(&mut self) -> &mut [PointEntry] {
         bytemuck::cast_slice_mut(&mut self.blocks)
-    }
-
-    /// Bytes held.
-    pub(crate) fn held_bytes(&self) -> usize {
-        held(&self.blocks)
     }
 }
 

@@ -17,23 +17,20 @@ pub(crate) struct Drifts {
 impl Drifts {
     /// Brings drifts into lane order. Called once per step, before all sweeps.
     pub fn load(&mut self, passes: &mut Passes<'_>) {
-        if passes.runs(Phase::Prepare) {
-            self.vector.clear();
-            if passes.rows_per_point() == 2 {
-                let StepParts { work: Workspace { lanes, serial, .. }, .. } = passes.parts();
-                self.vector.reset([lanes, serial], 0);
-                let drifts = passes.parts_of(&mut self.vector);
-                passes.run(Phase::Prepare, &mut LoadDrift { drifts });
-            }
+        self.vector.clear();
+        if passes.rows_per_point() == 2 {
+            let StepParts { work: Workspace { lanes, serial, .. }, .. } = passes.parts();
+            self.vector.reset([lanes, serial], 0);
+            let drifts = passes.parts_of(&mut self.vector);
+            passes.run(Phase::Prepare, &mut LoadDrift { drifts });
         }
     }
 
     /// One sweep, without the rows of points that bounce.
     pub fn sweep(&mut self, passes: &mut Passes<'_>, phase: Phase, sticky: Sticky) {
         let drifts = passes.parts_of(&mut self.vector);
-        if passes.run(phase, &mut StickySweep { sticky, drifts }) {
-            passes.count_sweep(passes.rows_per_point());
-        }
+        passes.run(phase, &mut StickySweep { sticky, drifts });
+        passes.count_sweep(passes.rows_per_point());
     }
 
     /// One sweep, and one over the rows of points that bounce. `law` is the law that they solve.
@@ -48,9 +45,5 @@ impl Drifts {
             let drifts = passes.parts_of(&mut self.vector);
             passes.run(Phase::Store, &mut BookDrift { reach, drifts });
         }
-    }
-
-    pub fn held_bytes(&self) -> usize {
-        self.vector.held_bytes()
     }
 }

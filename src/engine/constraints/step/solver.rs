@@ -35,11 +35,6 @@ pub trait Solver: fmt::Debug + Send {
 
     /// A copy of the solver, with all data that it keeps.
     fn boxed(&self) -> Box<dyn Solver>;
-
-    /// Bytes held.
-    fn held_bytes(&self) -> usize {
-        0
-    }
 }
 
 impl Clone for Box<dyn Solver> {

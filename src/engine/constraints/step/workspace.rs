@@ -1,6 +1,5 @@
 //! Working data, inputs and counts of a step.
 
-use crate::clock::PhaseFilter;
 use crate::constraints::impacts::{ImpactLaw, ImpactRecords};
 use crate::constraints::kernels::motion::Motion;
 use crate::constraints::kernels::observe::ObservedRule;
@@ -76,13 +75,6 @@ impl Clone for Workspace {
     }
 }
 
-impl Workspace {
-    /// Bytes held for data that only some solvers use.
-    pub fn own_bytes(&self) -> usize {
-        self.kept.held_bytes() + self.vectors.iter().map(PointVector::held_bytes).sum::<usize>()
-    }
-}
-
 /// Work counts of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WorkCount {
@@ -114,8 +106,6 @@ pub struct StepInput {
     pub parameters: Parameters,
     /// Mechanisms of the solver that are left out.
     pub without: Without,
-    /// Which phases run.
-    pub phases: PhaseFilter,
     /// Whether to sum impulses into [`crate::contacts::Contact::step_impulse`].
     pub record_impulses: bool,
     /// Impact law of the run.

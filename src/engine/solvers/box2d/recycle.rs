@@ -14,7 +14,6 @@
 //! just as cheap to find.
 
 use crate::contacts::Contact;
-use crate::lanes::held;
 use crate::narrowphase::batch::{NO_CONTACT, PairKind};
 use crate::narrowphase::candidate::Candidates;
 use crate::narrowphase::lanes::PoseRow;
@@ -110,12 +109,6 @@ impl KeptManifold {
 }
 
 impl Recycled {
-    /// Bytes held.
-    pub fn held_bytes(&self) -> usize {
-        let lists = self.found.iter().chain(&self.last_found);
-        lists.map(held).sum::<usize>() + held(&self.kept)
-    }
-
     /// Updates kept manifolds to the current poses, and marks their candidates in `keep`. With a distance of
     /// zero none are kept.
     pub fn update(

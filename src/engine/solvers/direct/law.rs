@@ -3,6 +3,7 @@
 
 use super::{PASSES, PIVOTS, SHIFT, TOLERANCE};
 use crate::constraints::numerics::block_lu::{BlockLu, inverse};
+use crate::constraints::numerics::cone;
 use crate::constraints::numerics::coulomb_lcp::CoulombLcp;
 use crate::constraints::records::rows::{RowBlock, RowLaw};
 use crate::constraints::vectors::system::{Pair, PointRows};
@@ -264,10 +265,7 @@ impl IslandLaw {
             let argument = argument(i, impulses, &change, &moved, 0.0);
             let new = match i % 2 {
                 0 => argument.max(0.0),
-                _ => {
-                    let bound = self.friction[i / 2] * impulses[i - 1];
-                    argument.max(-bound).min(bound)
-                }
+                _ => cone::friction_f64(argument, self.friction[i / 2] * impulses[i - 1]),
             };
             put(i, new, impulses, &mut change, &mut moved);
         }
@@ -297,8 +295,8 @@ impl IslandLaw {
     pub fn merit(&self, impulses: &[f64], arguments: &[f64]) -> f64 {
         let one = |i: usize| {
             let (normal, tangent) = (arguments[2 * i].max(0.0), arguments[2 * i + 1]);
-            let bound = self.friction[i] * normal;
-            let r = [impulses[2 * i] - normal, impulses[2 * i + 1] - tangent.max(-bound).min(bound)];
+            let tangent = cone::friction_f64(tangent, self.friction[i] * normal);
+            let r = [impulses[2 * i] - normal, impulses[2 * i + 1] - tangent];
             self.diagonal(2 * i) * r[0] * r[0] + self.diagonal(2 * i + 1) * r[1] * r[1]
         };
         let contacts = (0..self.points.len()).map(one).sum::<f64>();

@@ -26,6 +26,7 @@
 
 use crate::constraints::System;
 use crate::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
+use crate::constraints::numerics::cone;
 use crate::constraints::numerics::envelope::Envelope;
 use crate::constraints::records::rows::{RowBlock, RowLaw};
 use crate::constraints::vectors::blocks::JointBlocks;
@@ -567,10 +568,6 @@ impl Convex {
 
     /// Writes velocities and impulses to the system.
     pub fn write(&mut self, system: &mut System<'_>) {
-        let bytes = |count: usize, each: usize| (count * each) as f64;
-        let blocks = bytes(self.blocks.len(), size_of::<ConvexBlock>());
-        let matrix = bytes(self.matrix.entries(), size_of::<f64>());
-        system.book([2.0 * (blocks + matrix), blocks + matrix]);
         for (v, body) in self.velocities.iter().zip(&self.bodies) {
             let to = &mut system.rows()[body.row].velocity;
             v.iter().zip(to).for_each(|(v, to)| *to = *v as f32);
@@ -579,8 +576,7 @@ impl Convex {
         for (&at, block) in self.places.iter().zip(&self.blocks) {
             let ImpulseBound::Cone(friction) = block.bound else { continue };
             let normal = (block.impulse[0] as f32).max(0.0);
-            let bound = friction as f32 * normal;
-            impulses[at] = [normal, (block.impulse[1] as f32).min(bound).max(-bound)];
+            impulses[at] = [normal, cone::friction(block.impulse[1] as f32, friction as f32 * normal)];
         }
         system.set_impulses(&impulses);
         if !self.joints.blocks.is_empty() {

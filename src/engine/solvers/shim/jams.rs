@@ -54,7 +54,6 @@ use crate::constraints::kernels::types::Joined;
 use crate::constraints::step::CollisionScene;
 use crate::contacts::{Contact, ManifoldPoint};
 use crate::disjoint::DisjointSets;
-use crate::lanes::held;
 use crate::narrowphase::Margins;
 use glam::Vec2;
 
@@ -237,16 +236,6 @@ impl Jams {
                 }
             }
         }
-    }
-
-    /// Bytes held.
-    pub fn held_bytes(&self) -> usize {
-        held(&self.deep)
-            + held(&self.pressed)
-            + held(&self.squeezed)
-            + held(&self.jammed)
-            + self.welded.bytes()
-            + held(&self.holders)
     }
 }
 

@@ -6,7 +6,7 @@ use crate::constraints::joints::{ANCHORS, JointType, Joints, placed_anchors, wri
 use crate::constraints::kernels::frame::{INV_INERTIA, INV_MASS};
 use crate::constraints::kernels::types::{ConstraintType, TypeInput};
 use crate::constraints::records::links::{ChainLink, LINK_LANES, LinkImpulses, LinkRows, LinkRule};
-use crate::lanes::{BodyRow, Indices, LaneIndex, Lanes, RowStore, held};
+use crate::lanes::{BodyRow, Indices, LaneIndex, Lanes, RowStore};
 use crate::narrowphase::lanes::PoseRow;
 use std::ops::{Deref, DerefMut};
 use wide::f32x8;
@@ -54,13 +54,6 @@ impl Linked {
     /// Number of links.
     pub(crate) fn count(&self) -> usize {
         self.links.len()
-    }
-
-    pub(crate) fn held_bytes(&self) -> usize {
-        let Linked { active: _, inert: _, links, groups, joints, bodies, ways, records, kept, aside } = self;
-        let indices = bodies.iter().chain([joints]).map(Indices::held_bytes).sum::<usize>();
-        let lists = held(links) + held(groups) + held(aside);
-        indices + lists + held(ways) + held(records) + held(kept)
     }
 }
 

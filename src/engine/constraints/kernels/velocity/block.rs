@@ -46,7 +46,7 @@
 use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_MASS, TURN, arms, separation, spin, to_frame, turn, with_arms,
 };
-use crate::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::constraints::kernels::pass::{Pass, PassInput};
 use crate::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
 use crate::constraints::kernels::velocity::rules::Softness;
 use crate::constraints::kernels::velocity::sweep::{NormalRule, Rows, unbounded_friction};
@@ -64,10 +64,6 @@ const SINGULAR: f32 = 1e-3;
 pub struct BlockSweep<R, const NORMAL_FIRST: bool>(pub R);
 
 impl<R: NormalRule, const NORMAL_FIRST: bool> Pass for BlockSweep<R, NORMAL_FIRST> {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        PerLane::of_sweep(layout, R::FRICTION, opposite)
-    }
-
     fn law(&self) -> Softness {
         self.0.of_errors()
     }
@@ -129,8 +125,8 @@ fn friction_rows<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
     for p in 0..N::POINTS {
         let arm = arms::<L, N, O>(record, &layout, p, 1);
         let vt = with_arms::<L, N, O>(along_t, state.w, arm);
-        let bound = friction * record[layout.at(p, layout.normal_impulse)];
-        let new = unbounded_friction(record, &layout, p, rule, vt).min(bound).max(-bound);
+        let wanted = unbounded_friction(record, &layout, p, rule, vt);
+        let new = rule.friction(wanted, record[layout.at(p, layout.normal_impulse)], friction);
         let at = layout.at(p, layout.tangent_impulse);
         let delta = new - record[at];
         record[at] = new;
@@ -251,7 +247,7 @@ where
             }
         }
         if friction_last {
-            tangent.solve_friction::<N, O>(record, &layout, new, mass_sum, state);
+            tangent.solve_friction::<N, O>(self.rule, record, &layout, new, mass_sum, state);
         }
         if const { NORMAL_FIRST || !N::FRICTION || !R::FRICTION } {
             state.sum[1] = tangent.sum;

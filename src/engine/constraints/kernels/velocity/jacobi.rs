@@ -7,11 +7,11 @@
 //! row store that reads from one place and accumulates in another.
 
 use crate::constraints::kernels::frame::{INV_MASS, VX, VY, W};
-use crate::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
+use crate::constraints::kernels::pass::{Pass, PassInput, PassMode};
 use crate::constraints::kernels::stages::over_segments;
 use crate::constraints::kernels::velocity::rules::{NormalRule, Relaxed, Soft, Softness};
 use crate::constraints::kernels::velocity::sweep::sweep_segment;
-use crate::constraints::records::features::{KernelFeatures, Layout, OnMoving, OnStatic, OppositeKind};
+use crate::constraints::records::features::{KernelFeatures, OnMoving, OnStatic, OppositeKind};
 use crate::lanes::{BodyRow, IndexList, LaneIndex, Lanes, RowStore};
 
 /// A Jacobi sweep under the soft rule, which is the rigid rule if it has no springs.
@@ -24,12 +24,6 @@ pub(crate) struct JacobiSweep<'a> {
 }
 
 impl Pass for JacobiSweep<'_> {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        // Gathers both bodies once for their velocities and once for their sums.
-        let sweep = PerLane::of_sweep(layout, true, opposite);
-        PerLane { rows: sweep.rows + sweep.halves, ..sweep }
-    }
-
     fn mode(&self) -> PassMode {
         PassMode::Jacobi { relaxation: self.relaxation }
     }

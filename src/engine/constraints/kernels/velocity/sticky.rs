@@ -32,9 +32,10 @@
 use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, spin, to_frame, turn, with_arms,
 };
-use crate::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::constraints::kernels::pass::{Pass, PassInput};
 use crate::constraints::kernels::stages::over_segments;
 use crate::constraints::kernels::velocity::rules::Softness;
+use crate::constraints::numerics::cone;
 use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
 use crate::constraints::records::features::{
     KernelFeatures, Layout, LayoutOf, OnMoving, OnStatic, Opposite, OppositeKind,
@@ -91,15 +92,6 @@ pub(crate) struct BookDrift<'a> {
 }
 
 impl Pass for StickySweep<'_> {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        let sweep = PerLane::of_sweep(layout, true, opposite);
-        PerLane {
-            floats_read: sweep.floats_read + layout.points,
-            floats_written: sweep.floats_written + layout.points,
-            ..sweep
-        }
-    }
-
     fn law(&self) -> Softness {
         Softness { bias_rate: self.sticky.fraction / self.sticky.h, ..Softness::RIGID }
     }
@@ -111,22 +103,12 @@ impl Pass for StickySweep<'_> {
 }
 
 impl Pass for LoadDrift<'_> {
-    fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
-        PerLane { floats_read: 1 + layout.points, floats_written: layout.points, ..PerLane::default() }
-    }
-
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         load::<L>(on.batches, on.kept, self.drifts[on.part as usize], F::layout);
     }
 }
 
 impl Pass for BookDrift<'_> {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        // Reads the record, the drifts and the index by which they are stored.
-        let read = 3 + layout.points * (layout.arms() + 2);
-        PerLane { halves: 0, ..PerLane::of_bodies(read, layout.points, opposite) }
-    }
-
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         over_segments!(book, L, F; on.rows, on.batches, on.kept, self.drifts[on.part as usize], self.reach);
@@ -259,7 +241,7 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
                 let at = layout.at(p, layout.tangent_impulse);
                 let old = record[at];
                 let wanted = mass.neg_mul_add(vt, old);
-                let new = wanted.min(bound).max(-bound);
+                let new = cone::friction(wanted, bound);
                 record[at] = new;
                 let over = wanted.max(-wanted) - bound;
                 if patch.is_some() {

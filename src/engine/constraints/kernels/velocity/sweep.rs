@@ -55,9 +55,10 @@
 use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, TURN, arms, separation, spin, to_frame, turn, turned, with_arms,
 };
-use crate::constraints::kernels::pass::{AnyPass, Pass, PassInput, PerLane};
+use crate::constraints::kernels::pass::{AnyPass, Pass, PassInput};
 use crate::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
 use crate::constraints::kernels::velocity::rules::Softness;
+use crate::constraints::numerics::cone;
 use crate::constraints::records::batches::{Batches, Segment};
 use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
@@ -108,6 +109,13 @@ pub trait NormalRule: Copy + Send + Sync + 'static {
         mass
     }
 
+    /// The new accumulated impulse of a friction row (N·s), from the impulse that would stop its sliding and
+    /// from the normal impulse of the same point (N·s) and µ (1).
+    #[inline(always)]
+    fn friction<L: Lanes>(&self, wanted: L, normal: L, friction: L) -> L {
+        cone::friction(wanted, friction * normal)
+    }
+
     /// The new accumulated impulse (N·s), ≥ 0, at the normal velocity `vn` (m/s).
     #[inline(always)]
     fn normal_impulse<L: Lanes>(&self, against_static: bool, vn: L, separation: L, mass: L, old: L) -> L {
@@ -130,10 +138,6 @@ pub trait NormalRule: Copy + Send + Sync + 'static {
 pub struct Sweep<R>(pub R);
 
 impl<R: NormalRule> Pass for Sweep<R> {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        PerLane::of_sweep(layout, R::FRICTION, opposite)
-    }
-
     fn law(&self) -> Softness {
         self.0.of_errors()
     }
@@ -243,6 +247,7 @@ impl<L: Lanes> Rows<L> {
     #[inline(always)]
     pub(crate) fn solve_friction<N: KernelFeatures, O: Opposite>(
         &mut self,
+        rule: impl NormalRule,
         record: &mut [L],
         layout: &Layout,
         normal: [L; 2],
@@ -252,8 +257,7 @@ impl<L: Lanes> Rows<L> {
         let inertia = state.inertia;
         let friction = record[layout.friction];
         for p in 0..N::POINTS {
-            let bound = friction * normal[p];
-            let new = self.impulse[p].min(bound).max(-bound);
+            let new = rule.friction(self.impulse[p], normal[p], friction);
             record[layout.at(p, layout.tangent_impulse)] = new;
             let delta = new - self.old[p];
             self.sum = self.sum + delta;
@@ -384,7 +388,7 @@ impl<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule> Stages<L, N, O> fo
             spin::<L, N, O>(&mut state.w, inertia, arm, delta);
         }
         if friction_rows {
-            tangent.solve_friction::<N, O>(record, &layout, normal.impulse, mass_sum, state);
+            tangent.solve_friction::<N, O>(self.0, record, &layout, normal.impulse, mass_sum, state);
         }
         state.sum = [normal.sum, tangent.sum];
     }

@@ -1,7 +1,7 @@
 //! The warm start: the impulses of the previous step serve as the initial guess of this one.
 
 use crate::constraints::kernels::frame::{BodyPair, INV_INERTIA, TURN, W, apply, arms, spin, turn, turned};
-use crate::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::constraints::kernels::pass::{Pass, PassInput};
 use crate::constraints::kernels::stages::{for_each_batch, over_segments};
 use crate::constraints::records::batches::{Batches, Segment};
 use crate::constraints::records::features::{
@@ -17,13 +17,6 @@ pub struct WarmStart {
 }
 
 impl Pass for WarmStart {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        // Without friction, only the arms along the normal are read.
-        let impulses = if layout.has_friction { 2 } else { 1 };
-        let arms = if layout.has_friction { layout.arms() } else { layout.arms() / 2 };
-        PerLane::of_bodies(2 + layout.points * (impulses + arms), 0, opposite)
-    }
-
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         if self.turned {
