@@ -6,7 +6,6 @@ use super::agree::AgreeArgs;
 use super::capture::CaptureArgs;
 use super::compare::CompareArgs;
 use super::converge::ConvergeArgs;
-use super::growth::GrowthArgs;
 use super::merge::MergeArgs;
 use super::papers::PapersArgs;
 use super::profile::ProfileArgs;
@@ -74,7 +73,6 @@ pub enum Command {
     Agree(AgreeArgs),
     Torture(TortureArgs),
     Profile(ProfileArgs),
-    Growth(GrowthArgs),
     Savings(SavingsArgs),
     Papers(PapersArgs),
     /// List the scenes

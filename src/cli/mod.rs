@@ -10,7 +10,6 @@ pub mod args;
 pub mod capture;
 pub mod compare;
 pub mod converge;
-pub mod growth;
 pub mod interrupt;
 pub mod merge;
 pub mod output;
@@ -112,7 +111,6 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Agree(args)) => agree::run(&args),
         Some(Command::Torture(args)) => torture::run(&args),
         Some(Command::Profile(args)) => profile::run(&args),
-        Some(Command::Growth(args)) => growth::run(&args),
         Some(Command::Savings(args)) => savings::run(&args),
         Some(Command::Papers(args)) => papers::run(&args),
         Some(Command::Scenes(args)) => scenes(&args),

@@ -72,9 +72,8 @@ impl Phase {
 /// Time of each phase of the last step, and of the whole step.
 ///
 /// ```
-/// # use simpulse_engine as simpulse;
-/// use simpulse::engine::clock::Phase;
-/// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+/// use simpulse_engine::clock::Phase;
+/// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
 /// let mut world = World::new(Settings { timed: true, ..Settings::new(solvers::find("pgs")?) });
 /// world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::circle(0.5)?))?;
 /// world.step()?;
@@ -87,6 +86,8 @@ impl Phase {
 pub struct Timings {
     /// Nanoseconds per phase, indexed by `Phase as usize`.
     pub phase_ns: [u64; Phase::ALL.len()],
+    /// Timed pieces per phase: passes over constraints or bodies. Indexed by `Phase as usize`.
+    pub laps: [u32; Phase::ALL.len()],
     /// Nanoseconds of the whole step.
     pub step_ns: u64,
 }
@@ -98,38 +99,6 @@ impl Timings {
     }
 }
 
-/// Memory traffic of the passes of one phase, if counted.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[doc(hidden)]
-pub struct Requested {
-    /// Sums over visited contacts, by kind of body a: floats read, floats written, rows gathered, half rows
-    /// written.
-    pub contacts: [[f64; 4]; 3],
-    /// Other bytes read and written: of bodies and of vectors.
-    pub bytes: [f64; 2],
-}
-
-/// Which phases of a step run: all, or one alone on the records of an earlier step.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[doc(hidden)]
-pub struct PhaseFilter {
-    /// The only phase that runs; `None` runs all.
-    pub only: Option<Phase>,
-    /// Whether the phase runs in one lane that counts, [`crate::engine::lanes::Counted`].
-    pub counted: bool,
-}
-
-impl PhaseFilter {
-    /// All phases of a step.
-    pub const ALL: PhaseFilter = PhaseFilter { only: None, counted: false };
-
-    /// Whether passes of `phase` run.
-    #[inline]
-    pub fn runs(&self, phase: Phase) -> bool {
-        self.only.is_none_or(|only| only == phase)
-    }
-}
-
 /// Stopwatch of a step: each lap adds the time since the last one to a phase. A clock that is off counts laps
 /// without reading the time.
 #[derive(Debug)]
@@ -137,10 +106,6 @@ impl PhaseFilter {
 pub struct Clock {
     timings: Timings,
     start: Option<(Instant, Instant)>,
-    requested: Requested,
-    laps: [u32; Phase::ALL.len()],
-    /// Wait time of the thread at the last lap, if waits are subtracted.
-    waited: Option<Duration>,
 }
 
 impl Clock {
@@ -150,42 +115,7 @@ impl Clock {
             let now = Instant::now();
             (now, now)
         });
-        Clock {
-            timings: Timings::default(),
-            start,
-            requested: Requested::default(),
-            laps: [0; Phase::ALL.len()],
-            waited: None,
-        }
-    }
-
-    /// Starts a step whose times exclude the pauses in which the thread waited for a processor, if the system
-    /// reports them. Each lap then costs a few microseconds, which are not counted. The time of the step is
-    /// the sum of its phases.
-    pub(crate) fn without_pauses() -> Self {
-        Clock { waited: waited(), ..Clock::start(true) }
-    }
-
-    /// Counts the memory traffic of a pass over `contacts` contacts whose body a is of kind `opposite`.
-    pub(crate) fn book(&mut self, opposite: usize, contacts: usize, per_contact: [usize; 4]) {
-        for (sum, each) in self.requested.contacts[opposite].iter_mut().zip(per_contact) {
-            *sum += contacts as f64 * each as f64;
-        }
-    }
-
-    /// Adds bytes read and written.
-    pub(crate) fn book_bytes(&mut self, bytes: [f64; 2]) {
-        self.requested.bytes = [0, 1].map(|k| self.requested.bytes[k] + bytes[k]);
-    }
-
-    /// The memory traffic so far.
-    pub(crate) fn requested(&self) -> Requested {
-        self.requested
-    }
-
-    /// Laps of each phase, indexed by `Phase as usize`.
-    pub(crate) fn laps(&self) -> [u32; Phase::ALL.len()] {
-        self.laps
+        Clock { timings: Timings::default(), start }
     }
 
     /// Adds the time since the last lap to `phase`.
@@ -193,26 +123,16 @@ impl Clock {
     pub fn lap(&mut self, phase: Phase) {
         if let Some((_, last)) = &mut self.start {
             let now = Instant::now();
-            let mut elapsed = now - *last;
+            self.timings.phase_ns[phase as usize] += (now - *last).as_nanos() as u64;
             *last = now;
-            if let Some(before) = &mut self.waited {
-                let after = waited().unwrap_or(*before);
-                elapsed = elapsed.saturating_sub(after.saturating_sub(*before));
-                *before = after;
-                *last = Instant::now();
-            }
-            self.timings.phase_ns[phase as usize] += elapsed.as_nanos() as u64;
         }
-        self.laps[phase as usize] += 1;
+        self.timings.laps[phase as usize] += 1;
     }
 
     /// Ends the step.
     pub fn stop(mut self) -> Timings {
         if let Some((begin, _)) = self.start {
-            self.timings.step_ns = match self.waited {
-                None => begin.elapsed().as_nanos() as u64,
-                Some(_) => self.timings.phase_ns.iter().sum(),
-            };
+            self.timings.step_ns = begin.elapsed().as_nanos() as u64;
         }
         self.timings
     }
@@ -267,14 +187,7 @@ mod tests {
         let mut clock = Clock::start(false);
         clock.lap(Phase::Solve);
         clock.lap(Phase::Solve);
-        assert_eq!(clock.laps()[Phase::Solve as usize], 2);
-        assert_eq!(clock.stop().step_ns, 0);
-    }
-
-    #[test]
-    fn a_filter_lets_one_phase_through() {
-        assert!(Phase::ALL.into_iter().all(|phase| PhaseFilter::ALL.runs(phase)));
-        let one = PhaseFilter { only: Some(Phase::Solve), counted: false };
-        assert!(Phase::ALL.into_iter().all(|phase| one.runs(phase) == (phase == Phase::Solve)));
+        let timings = clock.stop();
+        assert_eq!((timings.laps[Phase::Solve as usize], timings.step_ns), (2, 0));
     }
 }

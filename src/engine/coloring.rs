@@ -19,8 +19,6 @@
 //!
 //! **Source:** Catto 2024, "SIMD Matters" (`catto2024simd`).
 
-use crate::engine::lanes::held;
-
 /// Marks a side that any number of edges of a color may share: a static or kinematic body, which is read but
 /// never written.
 pub const EXEMPT: u32 = u32::MAX;
@@ -104,12 +102,6 @@ impl Coloring {
     /// Forces the next call of [`Self::assign`] to recompute the colors.
     pub fn forget(&mut self) {
         self.starts.clear();
-    }
-
-    /// Allocated bytes.
-    pub fn held_bytes(&self) -> usize {
-        let small = held(&self.color_of) + held(&self.starts) + held(&self.order);
-        small + held(&self.edges) + held(&self.used)
     }
 
     /// Whether the coloring is that of these edges.

@@ -1,7 +1,5 @@
 //! Disjoint sets (union–find).
 
-use crate::engine::lanes::held;
-
 /// A partition of the numbers below a count into sets. Reuses its memory.
 #[derive(Clone, Debug, Default)]
 pub struct DisjointSets {
@@ -14,11 +12,6 @@ impl DisjointSets {
     pub fn begin(&mut self, count: usize) {
         self.parent.clear();
         self.parent.extend(0..count as u32);
-    }
-
-    /// Allocated bytes.
-    pub fn bytes(&self) -> usize {
-        held(&self.parent)
     }
 
     /// The smallest element of the set of `element`.

@@ -16,8 +16,8 @@ use simpulse::engine::constraints::{
 };
 use simpulse::engine::contacts::{Contact, quad};
 use simpulse::engine::lanes::{
-    BodyRow, Counted, IndexList, Indices, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowColumns,
-    RowStore, prefetch, prefetch_records,
+    BodyRow, IndexList, Indices, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowColumns, RowStore,
+    prefetch, prefetch_records,
 };
 use simpulse::engine::narrowphase::Margins;
 use simpulse::engine::narrowphase::batch::{Input, Jobs, NO_CONTACT, PairKind, Shapes, update};
@@ -163,7 +163,6 @@ macro_rules! at_every_width {
             $body::<f32x4>();
             $body::<f32x8>();
             $body::<f32x16>();
-            $body::<Counted>();
         }
     )* };
 }

@@ -3,7 +3,7 @@
 use glam::Vec2;
 use proptest::prelude::*;
 use simpulse::engine::bodies::{Bodies, BodyDef, BodyKind};
-use simpulse::engine::broadphase::{BroadPhase, BroadPhaseKind, FatBoxes, HashGrid, Proxy, all_pairs};
+use simpulse::engine::broadphase::{BroadPhase, BroadPhaseKind, FatBoxes, Proxy};
 use simpulse::engine::params::SPECULATIVE_DISTANCE;
 use simpulse::engine::shapes::{Aabb, MassProperties, Shape};
 use simpulse::engine::solvers::find;
@@ -157,31 +157,6 @@ fn regular_spacing() {
     }
 }
 
-/// The bound stated by `HashGrid::bytes`, for scenes that would fill a grid of one cell size with billions of
-/// cells.
-#[test]
-fn memory_is_linear() {
-    for n in [1usize, 10, 1000, 5000] {
-        for decades in [0, 3, 12, 36] {
-            let mut proxies = Vec::new();
-            for i in 0..n {
-                let size = 10f32.powf((i as f32 / n as f32 - 0.5) * decades as f32);
-                let place = [(i * 7919 % n) as f32, (i * 104_729 % n) as f32];
-                proxies.push(boxed(place, [size, size], i as u32));
-            }
-            // Pairs are not part of the bound. Without a dynamic body there are none.
-            proxies.iter_mut().for_each(|p| p.dynamic = false);
-            let mut grid = HashGrid::new();
-            let mut out = Vec::new();
-            grid.pairs(&proxies, &mut out);
-            assert!(grid.bytes() <= 64 * n + 16384, "{n} proxies: {} bytes", grid.bytes());
-            let before = grid.bytes();
-            grid.pairs(&proxies, &mut out);
-            assert_eq!(grid.bytes(), before, "a repeated call allocates");
-        }
-    }
-}
-
 /// Distribution of sizes and positions.
 #[derive(Clone, Copy, Debug)]
 enum Style {
@@ -259,7 +234,7 @@ proptest! {
     ) {
         for kind in BroadPhaseKind::ALL {
             let mut broad_phase = BroadPhase::new(kind);
-            let (mut out, mut defined) = (Vec::new(), Vec::new());
+            let mut out = Vec::new();
             for frame in moves.chunks(7) {
                 for &(i, dx, dy, scale) in frame {
                     if let Some(proxy) = proxies.get_mut(i) {
@@ -270,7 +245,7 @@ proptest! {
                     }
                 }
                 broad_phase.pairs(&proxies, &mut out);
-                all_pairs(&proxies, &mut defined);
+                let defined = expected(&proxies);
                 prop_assert_eq!(&out, &defined, "{:?}", kind);
             }
         }
@@ -287,7 +262,7 @@ proptest! {
     ) {
         for kind in BroadPhaseKind::ALL {
             let mut broad_phase = BroadPhase::new(kind);
-            let (mut pairs, mut defined) = (Vec::new(), Vec::new());
+            let mut pairs = Vec::new();
             broad_phase.pairs(&proxies, &mut pairs);
             for frame in &frames {
                 let mut moved = Vec::new();
@@ -307,7 +282,7 @@ proptest! {
                     proxies.push(grown);
                 }
                 broad_phase.update(&proxies, &moved, &mut pairs);
-                all_pairs(&proxies, &mut defined);
+                let defined = expected(&proxies);
                 prop_assert_eq!(&pairs, &defined, "{:?}", kind);
             }
         }

@@ -1,6 +1,6 @@
 //! Law: contacts kept and updated in place equal contacts found from scratch.
 
-use simpulse::engine::broadphase::{Proxy, all_pairs};
+use simpulse::engine::broadphase::Proxy;
 use simpulse::engine::contacts::Contact;
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::narrowphase::{Margins, collide_in_step};
@@ -24,10 +24,11 @@ fn from_nothing(world: &World, last: &[Contact]) -> Vec<Contact> {
             dynamic: bodies.is_dynamic(body as usize),
         })
         .collect();
-    let mut pairs = Vec::new();
-    all_pairs(&proxies, &mut pairs);
     let mut contacts = Vec::new();
-    for [i, j] in pairs {
+    let all = 0..proxies.len();
+    let pairs = all.clone().flat_map(|i| all.clone().skip(i + 1).map(move |j| [i, j]));
+    for [i, j] in pairs.filter(|&[i, j]| proxies[i].may_touch(&proxies[j])).map(|pair| pair.map(|i| i as u32))
+    {
         let (a, b) = if proxies[j as usize].dynamic { (i, j) } else { (j, i) };
         let [body_a, body_b] = [a, b].map(|shape| world.shape_body[shape as usize]);
         let [pose_a, pose_b] = bodies.relative_poses(body_a as usize, body_b as usize);

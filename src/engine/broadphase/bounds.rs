@@ -32,10 +32,10 @@
 //! **Source:** boxes with a margin, Catto 2019 (`catto2019`). **Departure:** the test of (1).
 
 use super::Proxy;
-use crate::engine::bodies::{Bodies, BodyKind};
-use crate::engine::lanes::{LaneVec, held};
-use crate::engine::params::{AABB_MARGIN, MAX_POLYGON_VERTICES, SPECULATIVE_DISTANCE};
-use crate::engine::shapes::{Aabb, Pose, Shape};
+use crate::bodies::{Bodies, BodyKind};
+use crate::lanes::LaneVec;
+use crate::params::{AABB_MARGIN, MAX_POLYGON_VERTICES, SPECULATIVE_DISTANCE};
+use crate::shapes::{Aabb, Pose, Shape};
 use glam::Vec2;
 use wide::{f32x8, f32x16};
 
@@ -67,13 +67,6 @@ pub struct FatBoxes {
 }
 
 impl FatBoxes {
-    /// Allocated bytes.
-    pub fn held_bytes(&self) -> usize {
-        let columns = [&self.x, &self.y, &self.cos, &self.sin, &self.reach, &self.slack];
-        let lists = held(&self.first_shape) + held(&self.failed) + held(&self.moved);
-        columns.iter().map(|c| c.bytes()).sum::<usize>() + held(&self.outlines) + lists
-    }
-
     /// Adds or replaces a body. Its first shape is shape `first`.
     pub fn set(&mut self, body: usize, first: usize, shapes: &[Shape]) {
         if body == self.first_shape.len() {

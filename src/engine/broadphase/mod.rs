@@ -1,24 +1,10 @@
 //! Broad phase: finds pairs of shapes whose bounds overlap.
 //!
-//! Every kind gives the same sorted list, so the choice affects only the time. [`all_pairs()`] is the
-//! definition, [`HashGrid`] keeps no state, and [`Tree`] keeps its order and its list. [`FatBoxes`] determine
-//! which shapes need a search; a step in which no shape has left its fat box searches nothing. Nanoseconds
-//! per proxy (Zen 5, 16 lanes) for scenes in motion, with the fraction of proxies that left their fat boxes:
-//!
-//! ```text
-//!                     proxies   pairs   moved    grid    tree
-//! large_pyramid        5 051   14 950     2 %      53       5
-//! smash                9 601   37 590    40 %      77      50
-//! tumbler              2 029    8 603    97 %     100      67
-//! washer               8 140   36 251    99 %     141      69
-//! circle_pile:2000     2 003    2 295    72 %      60      22
-//! junkyard             8 262    1 223    95 %      45      12
-//! ```
-//!
-//! The tree is faster in all of them. Rebuilding its order takes another 15 to 40 ns per proxy, so the grid
-//! is faster in dense scenes in which proxies jump in every step.
+//! Both kinds give the same sorted list, so the choice affects only the time. [`HashGrid`] keeps no state;
+//! [`Tree`] keeps its order and its list. [`FatBoxes`] determine which shapes need a search; a step in which
+//! no shape has left its fat box searches nothing. The tree is faster except in dense scenes in which shapes
+//! jump in every step.
 
-mod all_pairs;
 mod bounds;
 mod curve;
 mod hash_grid;
@@ -27,13 +13,12 @@ mod region;
 mod sort;
 mod tree;
 
-pub use all_pairs::all_pairs;
 pub use bounds::FatBoxes;
 pub use hash_grid::HashGrid;
 pub use region::Region;
 pub use tree::Tree;
 
-use crate::engine::shapes::Aabb;
+use crate::shapes::Aabb;
 
 /// A shape in the broad phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,8 +37,7 @@ impl Proxy {
     /// Whether the shapes may touch: closed bounds overlap, the bodies differ, at least one is dynamic, and
     /// they do not share a non-zero group.
     ///
-    /// Branch-free: with irregular sizes and positions, branches here made the grid take 1.4 times as long;
-    /// on the lattice of a pyramid they saved a quarter.
+    /// Branch-free: for irregular sizes and positions, branches are mispredicted.
     #[inline]
     pub fn may_touch(&self, other: &Proxy) -> bool {
         overlap(&self.aabb, &other.aabb) & self.may_meet(other)
@@ -83,14 +67,11 @@ pub enum BroadPhaseKind {
     /// [`Tree`]
     #[default]
     Tree,
-    /// [`all_pairs()`]
-    AllPairs,
 }
 
 impl BroadPhaseKind {
     /// Every kind.
-    pub const ALL: [BroadPhaseKind; 3] =
-        [BroadPhaseKind::HashGrid, BroadPhaseKind::Tree, BroadPhaseKind::AllPairs];
+    pub const ALL: [BroadPhaseKind; 2] = [BroadPhaseKind::HashGrid, BroadPhaseKind::Tree];
 }
 
 /// A broad phase with its buffers.
@@ -100,8 +81,6 @@ pub enum BroadPhase {
     HashGrid(HashGrid),
     /// See [`Tree`].
     Tree(Tree),
-    /// See [`all_pairs()`].
-    AllPairs,
 }
 
 impl BroadPhase {
@@ -110,16 +89,6 @@ impl BroadPhase {
         match kind {
             BroadPhaseKind::HashGrid => BroadPhase::HashGrid(HashGrid::default()),
             BroadPhaseKind::Tree => BroadPhase::Tree(Tree::default()),
-            BroadPhaseKind::AllPairs => BroadPhase::AllPairs,
-        }
-    }
-
-    /// Allocated bytes.
-    pub fn held_bytes(&self) -> usize {
-        match self {
-            BroadPhase::HashGrid(grid) => grid.held_bytes(),
-            BroadPhase::Tree(tree) => tree.held_bytes(),
-            BroadPhase::AllPairs => 0,
         }
     }
 
@@ -132,7 +101,6 @@ impl BroadPhase {
         match self {
             BroadPhase::HashGrid(grid) => grid.pairs(proxies, out),
             BroadPhase::Tree(tree) => tree.pairs(proxies, out),
-            BroadPhase::AllPairs => all_pairs(proxies, out),
         }
     }
 

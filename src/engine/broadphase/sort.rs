@@ -39,11 +39,6 @@ impl PairSort {
             sort_partners(&mut out[range[0] as usize..range[1] as usize]);
         }
     }
-
-    /// Allocated bytes.
-    pub fn bytes(&self) -> usize {
-        self.first.capacity() * size_of::<u32>()
-    }
 }
 
 /// Sorts the partners of one proxy: the position of each is the number of lower ones. Without data-dependent

@@ -29,7 +29,6 @@ use super::Proxy;
 use super::curve::{BITS, hilbert};
 use super::node::{BITS_OF_FAN, FAN, Node};
 use super::sort::PairSort;
-use crate::engine::lanes::held;
 use wide::f32x16;
 
 /// The order is rebuilt when the sum of the leaves' perimeters has grown by this factor.
@@ -64,19 +63,6 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// Allocated bytes.
-    pub fn held_bytes(&self) -> usize {
-        let nodes: usize = self.levels.iter().map(held).sum();
-        let lists: usize = [&self.found, &self.fresh, &self.merged, &self.stack].into_iter().map(held).sum();
-        nodes
-            + lists
-            + held(&self.keys)
-            + held(&self.order)
-            + held(&self.place)
-            + held(&self.moved)
-            + self.sort.bytes()
-    }
-
     /// An empty tree.
     pub fn new() -> Self {
         Self::default()
@@ -380,7 +366,7 @@ fn meet(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::shapes::Aabb;
+    use crate::shapes::Aabb;
     use glam::Vec2;
 
     /// A lattice of boxes that shears from frame to frame and changes in number.

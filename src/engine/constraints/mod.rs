@@ -22,7 +22,7 @@ pub mod step;
 pub mod vectors;
 
 pub use impacts::{ImpactLaw, Impacts};
-pub use kernels::pass::{AnyPass, Pass, PassInput, PerLane};
+pub use kernels::pass::{AnyPass, Pass, PassInput};
 pub use kernels::position::PositionSweep;
 pub use kernels::velocity::rules::{self, NormalRule, Rule};
 pub use records::batches::Batches;

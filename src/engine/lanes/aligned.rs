@@ -53,16 +53,6 @@ impl LaneVec {
     pub fn lanes_mut<L: Pod>(&mut self) -> &mut [L] {
         bytemuck::cast_slice_mut(&mut self.blocks)
     }
-
-    /// Allocated bytes.
-    pub fn bytes(&self) -> usize {
-        self.blocks.capacity() * 64
-    }
-}
-
-/// Allocated bytes of an array, used or not.
-pub fn held<T>(array: &Vec<T>) -> usize {
-    array.capacity() * size_of::<T>()
 }
 
 #[cfg(feature = "serde")]

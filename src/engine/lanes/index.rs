@@ -50,11 +50,6 @@ impl Indices {
     pub fn list(&self) -> IndexList<'_> {
         IndexList { entries: &self.entries, bound: self.bound }
     }
-
-    /// Allocated bytes.
-    pub fn held_bytes(&self) -> usize {
-        super::held(&self.entries)
-    }
 }
 
 impl Deref for Indices {

@@ -11,7 +11,6 @@
 //! is not emulated.
 
 mod aligned;
-mod counted;
 mod frame;
 mod index;
 mod quads;
@@ -23,8 +22,7 @@ mod vector;
 mod wide_lanes;
 mod width;
 
-pub use aligned::{Block, LaneVec, held};
-pub use counted::{Counted, Operations};
+pub use aligned::{Block, LaneVec};
 pub use frame::align_frame;
 pub use index::{IndexList, Indices, LaneIndex, MOST_LANES};
 pub use quads::{Quad, prefetch, prefetch_quad, prefetch_records};

@@ -26,9 +26,6 @@ pub trait Lanes:
     /// The number of lanes.
     const WIDTH: usize;
 
-    /// Whether operations are counted.
-    const COUNTS: bool = false;
-
     /// An index per lane: `[u32; WIDTH]`.
     type Index: Pod;
 

@@ -7,11 +7,9 @@ use super::hull_circle::HullCircle;
 use super::hulls::Hulls;
 use super::lanes::{Class, PoseRow, Poses, ShapePair, ShapeRow, Touch};
 use super::rectangles;
-use crate::engine::contacts::{Contact, quad};
-use crate::engine::lanes::{
-    IndexList, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, align_frame, held, prefetch_records,
-};
-use crate::engine::shapes::Shape;
+use crate::contacts::{Contact, quad};
+use crate::lanes::{IndexList, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, align_frame, prefetch_records};
+use crate::shapes::Shape;
 use bytemuck::bytes_of;
 use wide::{f32x4, f32x8, f32x16};
 
@@ -100,12 +98,6 @@ pub struct Jobs {
 pub const NO_CONTACT: u32 = u32::MAX;
 
 impl Jobs {
-    /// Allocated bytes.
-    pub fn held_bytes(&self) -> usize {
-        let Jobs { name, bodies: [a, b], shapes: [c, d], contact } = self;
-        [name, a, b, c, d, contact].map(held).iter().sum()
-    }
-
     /// Replaces the jobs by those of `pairs` that `job` keeps. `job` returns whether to keep a pair, and its
     /// bodies, shapes and contact.
     ///

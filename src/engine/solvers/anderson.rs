@@ -13,8 +13,7 @@
 //! `cargo test --release --test lab agree`. Departures, and how far each moves the result: growth of |f| by
 //! two forgets all before it (source: keeps it): 0 %.
 //!
-//! **Cost.** That of [`super::pgs`], and after each sweep passes over 2·`depth` + 4 vectors, in lanes. Sweeps
-//! of a step request 3830 B per contact.
+//! **Cost.** That of [`super::pgs`], and after each sweep passes over 2·`depth` + 4 vectors, in lanes.
 //!
 //! **Fails when** iterations are few, or contacts open and close: the combination is exact only for
 //! linear sweeps, and clamping is not linear.
@@ -31,12 +30,12 @@
 //! γ is found from the normal equations in `f64`, with at most 5 unknowns. 10⁻⁹ of the trace is added to their diagonal.
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::numerics::matrix::solve_in_place;
-use crate::engine::constraints::records::point_vector::{difference, energy, plus_scaled, update};
-use crate::engine::constraints::{Passes, Schedule};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::numerics::matrix::solve_in_place;
+use crate::constraints::records::point_vector::{difference, energy, plus_scaled, update};
+use crate::constraints::{Passes, Schedule};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

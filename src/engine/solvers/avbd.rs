@@ -23,7 +23,7 @@
 //!
 //! **Cost.** Per substep 3 body passes, and `velocity_iterations` + `position_iterations` times a pass over
 //! bodies with their contacts, each seen from both sides, and one over contacts, in lanes over the bodies of
-//! a color (`avbd/descent.rs`), and with their joints one by one. Sweeps of a step request 9477 B per contact.
+//! a color (`avbd/descent.rs`), and with their joints one by one.
 //!
 //! **Fails when** a loop of joints spins. Penalties that have grown beyond M/h² lock each body to the
 //! positions of its neighbors, and the loop as a whole turns too little per iteration. A triangle of rods
@@ -59,13 +59,14 @@ mod joints;
 mod lanes;
 
 use super::{Law, Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::types::{Joined, Placed};
-use crate::engine::constraints::records::graph::Graph;
-use crate::engine::constraints::records::kept::KeptSize;
-use crate::engine::constraints::step::StepParts;
-use crate::engine::constraints::{Features, ImpactLaw, Passes, Solver, Workspace};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::types::{Joined, Placed};
+use crate::constraints::numerics::cone;
+use crate::constraints::records::graph::Graph;
+use crate::constraints::records::kept::KeptSize;
+use crate::constraints::step::StepParts;
+use crate::constraints::{Features, ImpactLaw, Passes, Solver, Workspace};
+use crate::params::{Budget, Parameter};
 use descent::{Descent, NORMAL, PER_BODY, PER_POINT, TANGENT};
 use input::DescentInput;
 
@@ -152,18 +153,11 @@ impl Solver for Avbd {
     fn boxed(&self) -> Box<dyn Solver> {
         Box::new(self.clone())
     }
-
-    fn held_bytes(&self) -> usize {
-        self.graph.held_bytes() + self.descent.held_bytes()
-    }
 }
 
 impl Avbd {
     /// Assigns bodies to lanes, once per step and before everything else.
     fn assign(&mut self, passes: &mut Passes<'_>) {
-        if !passes.runs(Phase::Solve) {
-            return;
-        }
         passes.build_whole_graph(&mut self.graph);
         let StepParts { work: Workspace { rows, poses, types, lanes, serial, .. }, contacts, width, .. } =
             passes.parts();
@@ -186,9 +180,6 @@ impl Avbd {
         phase: Phase,
         work: impl FnOnce(&mut Descent, &mut DescentInput<'_>),
     ) {
-        if !passes.runs(phase) {
-            return;
-        }
         let StepParts {
             work: Workspace { rows, motion, kept, types, poses, .. },
             contacts,
@@ -215,20 +206,13 @@ impl Avbd {
                 length_unit: input.length_unit,
             },
         );
-        // Each contact is read from both of its bodies, and the numbers of its points are written.
-        let (contacts, size) = (contacts.len() as f64, 4.0 * kept.size().per_point as f64);
-        clock.book_bytes([2.0 * contacts * (76.0 + 16.0 + 2.0 * size), 2.0 * contacts * size]);
-        passes.book_rows([32.0, 16.0]);
-        passes.parts().clock.lap(phase);
+        clock.lap(phase);
     }
 }
 
 /// Writes the impulses h λ (N·s) of the forces kept per point into the records, clamped to their cones
 /// against rounding, for readers of contact impulses.
 fn keep_impulses(passes: &mut Passes<'_>, h: f32) {
-    if !passes.runs(Phase::Solve) {
-        return;
-    }
     let StepParts { work: Workspace { lanes, serial, kept, .. }, contacts, input, clock, .. } =
         passes.parts();
     for batches in [lanes, serial] {
@@ -242,7 +226,7 @@ fn keep_impulses(passes: &mut Passes<'_>, h: f32) {
                 record[layout.at(p, layout.normal_impulse) * width + lane] = normal;
                 if layout.has_friction {
                     let at = layout.at(p, layout.tangent_impulse) * width + lane;
-                    record[at] = tangent.min(bound).max(-bound);
+                    record[at] = cone::friction(tangent, bound);
                 }
             }
         });

@@ -16,21 +16,21 @@
 //! method ends at the solution of the convex relaxation): `cargo test --release --test lab agree`.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` times 3 passes over
-//! vectors in lanes, one more for each step that was too long. Sweeps of a step request 11275 B per contact.
+//! vectors in lanes, one more for each step that was too long.
 //!
 //! **Fails when** anything slides: the relaxation makes the surfaces separate at µ times the sliding speed.
 //! Also when there are few iterations for the height of a pile.
 //!
 //! # The method
 //!
-//! See [`spectral`](crate::engine::constraints::vectors::spectral); Π gives the nearest point of the cones.
+//! See [`spectral`](crate::constraints::vectors::spectral); Π gives the nearest point of the cones.
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::vectors::spectral::{Axes, ImpulseProblem, SpectralDescent};
-use crate::engine::constraints::{ImpactLaw, Passes, Schedule, numerics::cone};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::vectors::spectral::{Axes, ImpulseProblem, SpectralDescent};
+use crate::constraints::{ImpactLaw, Passes, Schedule, numerics::cone};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -2,7 +2,7 @@
 //!
 //! **Source.** `catto2024box2d` (version 3.2); the rows are those of [`super::soft_step`].
 //!
-//! **Departures.** Restitution is this crate's ([`crate::engine::constraints::impacts::restitution`]), which
+//! **Departures.** Restitution is this crate's ([`crate::constraints::impacts::restitution`]), which
 //! conserves energy; Box2D returns e times the approach speed. Manifolds of bodies that hardly moved are kept
 //! as in Box2D, except those of discs (`box2d/recycle.rs`). Contacts are solved in the order of this crate's
 //! colors.
@@ -12,7 +12,7 @@
 //! source's method in `f64` over 10 substeps by less than 6e-5: `cargo test --release --test lab agree`.
 //!
 //! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations` soft sweeps
-//! without friction and `relax_iterations` rigid ones with it. Sweeps of a step request 1638 B per contact.
+//! without friction and `relax_iterations` rigid ones with it.
 //!
 //! **Fails when** [`super::soft_step`] does. Sliding and sticking are less accurate: in each substep friction
 //! is solved only once, on top of the normal velocities that the springs left.
@@ -20,11 +20,11 @@
 mod recycle;
 
 use super::{Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
-use crate::engine::constraints::step::{Collision, CollisionScene};
-use crate::engine::constraints::{ImpactLaw, Passes, Solver};
-use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, LINEAR_SLOP, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
+use crate::constraints::step::{Collision, CollisionScene};
+use crate::constraints::{ImpactLaw, Passes, Solver};
+use crate::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, LINEAR_SLOP, Parameter};
 use recycle::Recycled;
 
 /// Index of `recycle_distance` among the parameters.
@@ -78,10 +78,6 @@ impl Solver for Box2d {
 
     fn boxed(&self) -> Box<dyn Solver> {
         Box::new(self.clone())
-    }
-
-    fn held_bytes(&self) -> usize {
-        self.recycled.held_bytes()
     }
 }
 

@@ -24,7 +24,7 @@
 //! n bodies in a band of b, one lane. Whole steps take 30 and 58 µs on
 //! `stack:10` and `stack:20`, 0.6 and 4 ms on `pyramid:10` and `pyramid:20` (AMD EPYC, AVX-512, 2026-11-24). Lemke's method goes through a
 //! tableau of 16m² entries for m points at each pivot, and there are more pivots than points: it loses to Newton's from the first
-//! point on. Sweeps of a step request 7766 B per contact.
+//! point on.
 //!
 //! **Fails when** bands are wide, and where friction allows a point neither to stick nor to slip consistently
 //! (Painlevé): then the states cycle, and the impulses of the sweeps remain.
@@ -45,16 +45,17 @@
 mod law;
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::kernels::velocity::rules::NormalRule;
-use crate::engine::constraints::numerics::block_lu::BlockLu;
-use crate::engine::constraints::vectors::blocks::JointBlocks;
-use crate::engine::constraints::vectors::system::{Pair, PointRows};
-use crate::engine::constraints::{ImpactLaw, Passes, Schedule, System};
-use crate::engine::disjoint::DisjointSets;
-use crate::engine::lanes::BodyRow;
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::kernels::velocity::rules::NormalRule;
+use crate::constraints::numerics::block_lu::BlockLu;
+use crate::constraints::numerics::cone;
+use crate::constraints::vectors::blocks::JointBlocks;
+use crate::constraints::vectors::system::{Pair, PointRows};
+use crate::constraints::{ImpactLaw, Passes, Schedule, System};
+use crate::disjoint::DisjointSets;
+use crate::lanes::BodyRow;
+use crate::params::{Budget, Parameter};
 use law::IslandLaw;
 
 /// See the [module](self).
@@ -325,8 +326,8 @@ impl Island {
         let points = &self.law.points;
         for (i, point) in points.iter().enumerate() {
             let (at, normal) = (point.at, self.impulses[2 * i].max(0.0) as f32);
-            let bound = surfaces[at][1] * normal;
-            let new = [normal, (self.impulses[2 * i + 1] as f32).min(bound).max(-bound)];
+            let tangent = self.impulses[2 * i + 1] as f32;
+            let new = [normal, cone::friction(tangent, surfaces[at][1] * normal)];
             delta[at] = [0, 1].map(|axis| new[axis] - written[at][axis]);
             written[at] = new;
         }

@@ -16,7 +16,7 @@
 //! less than 6e-5: `cargo test --release --test lab agree`.
 //!
 //! **Cost.** Per step 2 body passes, 1 warm start, `velocity_iterations` velocity sweeps and `position_iterations` position
-//! sweeps. Sweeps of a step request 2459 B per contact.
+//! sweeps.
 //!
 //! **Fails when** stacks are tall, or heavy bodies rest on light ones: ten sweeps carry a load up ten
 //! contacts. A slop of 2 cm is visible in small scenes.
@@ -33,11 +33,11 @@
 mod sweep;
 
 use super::{Law, Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Rigid;
-use crate::engine::constraints::kernels::velocity::sweep::Sweep;
-use crate::engine::constraints::{Passes, PositionSweep, Schedule};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Rigid;
+use crate::constraints::kernels::velocity::sweep::Sweep;
+use crate::constraints::{Passes, PositionSweep, Schedule};
+use crate::params::{Budget, Parameter};
 use sweep::ContactFriction;
 
 /// See the [module](self).

@@ -15,16 +15,15 @@
 //! by less than 6e-5: `cargo test --release --test lab agree`. Departures, and how far each moves the result:
 //! 2 local iterations (source: until the contact is solved): 10 %.
 //!
-//! **Cost.** That of [`super::pgs`] with `velocity_iterations` × `local_iterations` sweeps. Sweeps of a step
-//! request 1750 B per contact.
+//! **Cost.** That of [`super::pgs`] with `velocity_iterations` × `local_iterations` sweeps.
 //!
 //! **Fails when** loads must travel far, which takes sweeps over all contacts.
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::{Passes, Schedule, SweepOrder};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::{Passes, Schedule, SweepOrder};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

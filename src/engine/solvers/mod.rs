@@ -5,9 +5,8 @@
 //! Two solvers on the same stack:
 //!
 //! ```
-//! # use simpulse_engine as simpulse;
-//! use simpulse::engine::bodies::{BodyDef, ShapeDef};
-//! use simpulse::engine::{solvers, world::{Settings, World}};
+//! use simpulse_engine::bodies::{BodyDef, ShapeDef};
+//! use simpulse_engine::{solvers, world::{Settings, World}};
 //!
 //! let sag = |solver: &str| -> Result<f32, Box<dyn std::error::Error>> {
 //!     let mut world = World::new(Settings::new(solvers::find(solver)?));
@@ -26,13 +25,13 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use crate::engine::clock::Clock;
-use crate::engine::constraints::records::kept::KeptSize;
-use crate::engine::constraints::{ImpactLaw, Passes, Schedule, Solver, StepInput, WorkCount, Workspace};
-use crate::engine::contacts::Contact;
-use crate::engine::error::Error;
-use crate::engine::lanes::LaneWidth;
-use crate::engine::params::{Budget, MAX_PARAMETERS, Mechanism, Parameter, Parameters};
+use crate::clock::Clock;
+use crate::constraints::records::kept::KeptSize;
+use crate::constraints::{ImpactLaw, Passes, Schedule, Solver, StepInput, WorkCount, Workspace};
+use crate::contacts::Contact;
+use crate::error::Error;
+use crate::lanes::LaneWidth;
+use crate::params::{Budget, MAX_PARAMETERS, Mechanism, Parameter, Parameters};
 
 pub mod admm;
 pub mod anderson;
@@ -67,11 +66,10 @@ pub mod symmetric_gs;
 pub mod tgs_ngs;
 pub mod tgs_soft;
 pub mod tgs_sticky;
-pub mod two_level;
 pub mod xpbd;
 
 /// Every solver of the crate.
-pub static VARIANTS: [&Variant; 35] = [
+pub static VARIANTS: [&Variant; 34] = [
     &projection::SOLVER,
     &pgs::SOLVER,
     &pgs_ngs::SOLVER,
@@ -106,7 +104,6 @@ pub static VARIANTS: [&Variant; 35] = [
     &rapier::SOLVER,
     &physx::SOLVER,
     &jolt::SOLVER,
-    &two_level::SOLVER,
 ];
 
 /// Solver used if none is named.
@@ -146,12 +143,11 @@ pub enum Law {
 /// A solver defined outside the crate needs no row in the table to run:
 ///
 /// ```
-/// # use simpulse_engine as simpulse;
-/// use simpulse::engine::clock::Phase;
-/// use simpulse::engine::constraints::kernels::velocity::rules::Baumgarte;
-/// use simpulse::engine::constraints::{Passes, Schedule};
-/// use simpulse::engine::solvers::Variant;
-/// use simpulse::engine::world::{Settings, World};
+/// use simpulse_engine::clock::Phase;
+/// use simpulse_engine::constraints::kernels::velocity::rules::Baumgarte;
+/// use simpulse_engine::constraints::{Passes, Schedule};
+/// use simpulse_engine::solvers::Variant;
+/// use simpulse_engine::world::{Settings, World};
 ///
 /// static MINE: Variant = Variant { name: "mine", make: || Schedule::boxed(step), ..Variant::BASE };
 ///
@@ -169,7 +165,7 @@ pub enum Law {
 ///
 /// let mut world = World::new(Settings::new(&MINE));
 /// world.step()?;
-/// # Ok::<(), simpulse::engine::world::Divergence>(())
+/// # Ok::<(), simpulse_engine::world::Divergence>(())
 /// ```
 #[derive(Debug)]
 pub struct Variant {
@@ -195,7 +191,7 @@ pub struct Variant {
     pub softness: Option<fn(&Parameters, f32) -> [f32; 2]>,
     /// Impact law of its source.
     pub impacts: ImpactLaw,
-    /// Default of [continuous collision](crate::engine::continuous).
+    /// Default of [continuous collision](crate::continuous).
     pub continuous: bool,
     /// Numbers kept from step to step, in addition to impulses.
     pub kept: KeptSize,
@@ -277,7 +273,7 @@ impl Variant {
         Ok(())
     }
 
-    /// Index of the mechanism called `name`, for [`crate::engine::params::Without`]; hyphens count as
+    /// Index of the mechanism called `name`, for [`crate::params::Without`]; hyphens count as
     /// underscores. Errors: no such mechanism.
     pub fn mechanism(&self, name: &str) -> Result<usize, Error> {
         let plain = name.replace('-', "_");

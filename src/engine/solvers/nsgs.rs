@@ -11,8 +11,7 @@
 //! iterations, baumgarte 0.3. Apart from the source's method in `f64` over 10 iterations by less than 6e-5:
 //! `cargo test --release --test lab agree`.
 //!
-//! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` sweeps. Sweeps of a step request
-//! 1750 B per contact.
+//! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` sweeps.
 //!
 //! **Fails when** [`super::pgs`] does: one point is exact, its neighbor is not.
 //!
@@ -40,21 +39,22 @@
 //! |y| (the case of Painlevé's rod). If r ≤ 0 the point does not touch, and both impulses are zero.
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::frame::{
+use crate::clock::Phase;
+use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, TURN, arms, separation, spin, to_frame, turn, with_arms,
 };
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
-use crate::engine::constraints::kernels::velocity::rules::{Baumgarte, NormalRule, Softness};
-use crate::engine::constraints::kernels::velocity::sweep::Sweep;
-use crate::engine::constraints::records::batches::{Batches, Segment};
-use crate::engine::constraints::records::features::{
+use crate::constraints::kernels::pass::{Pass, PassInput};
+use crate::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
+use crate::constraints::kernels::velocity::rules::{Baumgarte, NormalRule, Softness};
+use crate::constraints::kernels::velocity::sweep::Sweep;
+use crate::constraints::numerics::cone;
+use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::constraints::{Passes, Schedule};
-use crate::engine::lanes::{BodyRow, Lanes};
-use crate::engine::params::Parameter;
+use crate::constraints::{Passes, Schedule};
+use crate::lanes::{BodyRow, Lanes};
+use crate::params::Parameter;
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -87,10 +87,6 @@ fn step(passes: &mut Passes<'_>) {
 struct ConeSweep<R>(R);
 
 impl<R: NormalRule> Pass for ConeSweep<R> {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        PerLane::of_sweep(layout, R::FRICTION, opposite)
-    }
-
     fn law(&self) -> Softness {
         self.0.of_errors()
     }
@@ -210,8 +206,7 @@ fn point<L: Lanes>(friction: L, [g, f]: [L; 2], alone: [L; 2], old: [L; 2]) -> [
     let y = sticking.min(high).max(-low);
     let x = g.neg_mul_add(y, r).max(L::zero());
     // Rounding may leave y slightly outside the cone.
-    let bound = friction * x;
-    [x, y.min(bound).max(-bound)]
+    [x, cone::friction(y, friction * x)]
 }
 
 #[cfg(test)]

@@ -14,18 +14,17 @@
 //! --release --test lab agree`. Departures, and how far each moves the result: velocities are solved, with
 //! warm starts (source: positions, without, as `xpbd`): 40 times.
 //!
-//! **Cost.** Per step 1 warm start; per substep 2 body passes and `velocity_iterations` sweeps. Sweeps of a step
-//! request 3370 B per contact.
+//! **Cost.** Per step 1 warm start; per substep 2 body passes and `velocity_iterations` sweeps.
 //!
 //! **Fails when** there is only one sweep per substep. The residual of that sweep is applied again by the
 //! warm start of the next substep, and grows in pyramids (`papers/solver2d.md`); a second sweep damps it.
 //! Baumgarte's push adds energy, as in [`super::pgs`].
 
 use super::Variant;
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::{Passes, Schedule};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::{Passes, Schedule};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

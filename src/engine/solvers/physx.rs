@@ -20,8 +20,7 @@
 //! the result: forces act in every substep (source: all before the first): 100 %.
 //!
 //! **Cost.** Per substep 2 body passes and `velocity_iterations` sweeps, and `relax_iterations` at the
-//! end; per step 1 pass that brings drifts into the order of the lanes and 1 that books them. No warm start. Sweeps of a step request 1077 B per
-//! contact.
+//! end; per step 1 pass that brings drifts into the order of the lanes and 1 that books them. No warm start.
 //!
 //! **Fails when** stacks are tall: impulses start from zero in each step.
 //!
@@ -36,14 +35,14 @@
 //! anchor.
 
 use super::{Law, Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Soft;
-use crate::engine::constraints::kernels::velocity::sticky::{Patch, Sticky};
-use crate::engine::constraints::kernels::velocity::sweep::Sweep;
-use crate::engine::constraints::records::kept::KeptSize;
-use crate::engine::constraints::step::Drifts;
-use crate::engine::constraints::{Passes, Solver};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Soft;
+use crate::constraints::kernels::velocity::sticky::{Patch, Sticky};
+use crate::constraints::kernels::velocity::sweep::Sweep;
+use crate::constraints::records::kept::KeptSize;
+use crate::constraints::step::Drifts;
+use crate::constraints::{Passes, Solver};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -126,9 +125,5 @@ impl Solver for PhysX {
 
     fn boxed(&self) -> Box<dyn Solver> {
         Box::new(self.clone())
-    }
-
-    fn held_bytes(&self) -> usize {
-        self.drifts.held_bytes()
     }
 }

@@ -12,16 +12,16 @@
 //! 6e-5: `cargo test --release --test lab agree`.
 //!
 //! **Cost.** Per substep 2 body passes, `position_iterations` position sweeps and
-//! `velocity_iterations` velocity sweeps. Sweeps of a step request 1306 B per contact.
+//! `velocity_iterations` velocity sweeps.
 //!
 //! **Fails when** anything should slide, roll or lean: there is no friction. Without warm starting, every
 //! step starts from zero impulses, so tall stacks sink and spread.
 
 use super::{Law, Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Touching;
-use crate::engine::constraints::{ImpactLaw, Passes, PositionSweep, Schedule};
-use crate::engine::params::Budget;
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Touching;
+use crate::constraints::{ImpactLaw, Passes, PositionSweep, Schedule};
+use crate::params::Budget;
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -14,16 +14,15 @@
 //! they come to is the solution of `pgs`): `cargo test --release --test lab agree`.
 //!
 //! **Cost.** That of [`super::pgs`], and a sort of colors (in natural order: of contacts) per sweep;
-//! in natural order records are visited out of the order of memory. Sweeps of a step request 1750 B per
-//! contact.
+//! in natural order records are visited out of the order of memory.
 //!
 //! **Fails when** [`super::pgs`] does: changes travel no further per sweep.
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::{Passes, Schedule, SweepOrder};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::{Passes, Schedule, SweepOrder};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -16,16 +16,15 @@
 //! moves the result: pairs below 10⁻³ of k₁₁ k₂₂ go row by row (source: below 10⁻²): 0 %.
 //!
 //! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations` soft block sweeps
-//! without friction and `relax_iterations` rigid block sweeps with it. Sweeps of a step request 1638 B per
-//! contact.
+//! without friction and `relax_iterations` rigid block sweeps with it.
 //!
 //! **Fails when** [`super::soft_step`] does: the block couples the two points of a contact, not two contacts.
 
 use super::{Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::{Frictionless, Soft, angular_frequencies};
-use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
-use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::{Frictionless, Soft, angular_frequencies};
+use crate::constraints::{ImpactLaw, Passes, Schedule};
+use crate::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

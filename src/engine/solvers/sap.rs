@@ -23,8 +23,7 @@
 //! --test lab agree`.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and up to `velocity_iterations` Newton steps, each a factorization in `f64`, one
-//! lane: 9 n b² operations for n bodies in a band of b bodies. A step in which nothing changes state takes one or two. Sweeps of a
-//! step request 103653 B per contact.
+//! lane: 9 n b² operations for n bodies in a band of b bodies. A step in which nothing changes state takes one or two.
 //!
 //! **Fails when** bodies slide: the relaxation separates the surfaces at µ times the sliding speed. When
 //! bands are wide. When iterations end early: impulses are velocities divided by `softness`, and mean
@@ -38,10 +37,10 @@
 pub mod convex;
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::{ImpactLaw, Passes, Schedule};
+use crate::params::{Budget, Parameter};
 use convex::Convex;
 
 /// See the [module](self).

@@ -23,7 +23,7 @@
 //!
 //! **Cost.** Per step 1 warm start, 1 pass that finds closed points, `load_sweeps` light sweeps over their loads, 1
 //! pass that shortens springs and, if something is fast, 1 that looks for impacts; per substep 2 body passes, 1 elimination
-//! along chains of joints (3 of those that something else acts on), `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones. Sweeps of a step request 5736 B per contact.
+//! along chains of joints (3 of those that something else acts on), `velocity_iterations` soft block sweeps and `relax_iterations` rigid ones.
 //!
 //! **Fails when** an impact needs more visits than the limit (B23.heavy), or a load is removed or moves to
 //! another contact within a step (B23.release, B23.rolling). Some heavy bodies rock on light ones for many
@@ -34,17 +34,17 @@ mod jams;
 mod rest;
 
 use super::{Law, Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::impacts::spread::VISITS;
-use crate::engine::constraints::joints::chains::{ChainStage, Chains};
-use crate::engine::constraints::kernels::velocity::rules::{Bearing, Between, Relaxed, Rigid, Soft};
-use crate::engine::constraints::records::kept::KeptSize;
-use crate::engine::constraints::step::{Collision, CollisionScene};
-use crate::engine::constraints::{ImpactLaw, Passes, Solver, Spreading};
-use crate::engine::lanes::{BodyRow, held};
-use crate::engine::narrowphase::batch::PairKind;
-use crate::engine::narrowphase::circles::Rolling;
-use crate::engine::params::{Budget, Mechanism, Parameter, lines_of};
+use crate::clock::Phase;
+use crate::constraints::impacts::spread::VISITS;
+use crate::constraints::joints::chains::{ChainStage, Chains};
+use crate::constraints::kernels::velocity::rules::{Bearing, Between, Relaxed, Rigid, Soft};
+use crate::constraints::records::kept::KeptSize;
+use crate::constraints::step::{Collision, CollisionScene};
+use crate::constraints::{ImpactLaw, Passes, Solver, Spreading};
+use crate::lanes::BodyRow;
+use crate::narrowphase::batch::PairKind;
+use crate::narrowphase::circles::Rolling;
+use crate::params::{Budget, Mechanism, Parameter, lines_of};
 use frames::Roll;
 use glam::Vec2;
 use jams::Jams;
@@ -275,7 +275,7 @@ impl Solver for Shim {
                 .run(Phase::Prepare, &mut Roll { middle, dt, steady: frames::STEADY * passes.length_unit() });
         }
         self.impacts(passes);
-        if passes.runs(Phase::Prepare) && passes.has(part::STATICS) {
+        if passes.has(part::STATICS) {
             self.rest(passes, springs, load_sweeps as u32);
             passes.parts().clock.lap(Phase::Prepare);
         }
@@ -315,11 +315,6 @@ impl Solver for Shim {
     fn boxed(&self) -> Box<dyn Solver> {
         Box::new(self.clone())
     }
-
-    fn held_bytes(&self) -> usize {
-        let parts = [self.hand_down.held_bytes(), self.chains.held_bytes(), self.jams.held_bytes()];
-        parts.iter().sum::<usize>() + held(&self.fields) + held(&self.joined) + held(&self.last_joined)
-    }
 }
 
 impl Shim {
@@ -354,7 +349,7 @@ impl Shim {
 
     /// Solves impacts before the step.
     fn impacts(&mut self, passes: &mut Passes<'_>) {
-        if passes.impacts() == SOLVER.impacts && passes.runs(Phase::Prepare) && passes.has(part::IMPACTS) {
+        if passes.impacts() == SOLVER.impacts && passes.has(part::IMPACTS) {
             passes.spread_impacts(Spreading {
                 timed: passes.has(part::MOMENT),
                 stops: Some(&self.joined),

@@ -17,21 +17,21 @@
 //!
 //! **Cost.** That of [`super::pgs`], then per level one pass over bodies and, over its contacts,
 //! three passes: effective masses, a sweep, effective masses. Contacts are grouped by level and
-//! color, so that low levels fill few lanes. Sweeps of a step request 1920 B per contact.
+//! color, so that low levels fill few lanes.
 //!
 //! **Fails when** the loads on lower bodies matter. The last sweep pushes the upper bodies without a reaction
 //! on the bodies below, so momentum is lost. Loads appear too light from below, levers tip the wrong way, and
 //! swinging bodies are damped.
 
 use super::{Law, Variant};
-use crate::engine::bodies::Bodies;
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::masses::ScaledMasses;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::records::graph::Graph;
-use crate::engine::constraints::{Passes, Solver, SweepOrder};
-use crate::engine::contacts::Contact;
-use crate::engine::params::{Budget, Parameter};
+use crate::bodies::Bodies;
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::masses::ScaledMasses;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::records::graph::Graph;
+use crate::constraints::{Passes, Solver, SweepOrder};
+use crate::contacts::Contact;
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -91,9 +91,5 @@ impl Solver for Shock {
 
     fn boxed(&self) -> Box<dyn Solver> {
         Box::new(self.clone())
-    }
-
-    fn held_bytes(&self) -> usize {
-        self.graph.held_bytes() + self.masses.held_bytes()
     }
 }

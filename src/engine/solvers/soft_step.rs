@@ -6,7 +6,7 @@
 //! `macklin2019` (substeps instead of iterations).
 //!
 //! **Departures.** From the second substep on, the warm start is a pass over bodies instead of constraints
-//! (see [`crate::engine::constraints::kernels::motion::Motion::extrapolate_velocities`]); in exact arithmetic
+//! (see [`crate::constraints::kernels::motion::Motion::extrapolate_velocities`]); in exact arithmetic
 //! the result is the same. Contacts with static and kinematic bodies are twice as stiff, as in the source.
 //!
 //! **Agreement.** The source at its best: 4 substeps of 1 and 1 sweep, 30 Hz, ζ 10, 2 m/s. Here: 4 substeps
@@ -16,17 +16,17 @@
 //! eighth of the substep rate, 3 m/s (source: a quarter, 2 m/s): 90 %.
 //!
 //! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations`
-//! soft sweeps and `relax_iterations` rigid ones. Sweeps of a step request 1750 B per contact.
+//! soft sweeps and `relax_iterations` rigid ones.
 //!
 //! **Fails when** the load is large for the stiffness. At rest a contact sinks by F/(m_eff ω²), whatever the
 //! number of iterations, so tall stacks and heavy bodies on light ones sag. More substeps allow a higher
 //! frequency, and the sag falls with the square of the frequency.
 
 use super::{Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
-use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
-use crate::engine::params::{Budget, CONTACT_HERTZ_FRACTION, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
+use crate::constraints::{ImpactLaw, Passes, Schedule};
+use crate::params::{Budget, CONTACT_HERTZ_FRACTION, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -10,7 +10,7 @@
 //! 6e-5: `cargo test --release --test lab agree`. Departures, and how far each moves the result: both loads
 //! of a contact before both frictions (source: in the order of rows): 50 %.
 //!
-//! **Cost.** That of [`super::pgs`]. Sweeps of a step request 1750 B per contact.
+//! **Cost.** That of [`super::pgs`].
 //!
 //! **Fails when** ω was chosen for another scene. A column of N discs converges fastest with ω = 2/(1 +
 //! sin(π/2N)): by ω − 1 per sweep instead of cos²(π/2N). Piles with redundant rows gain less (the second
@@ -18,10 +18,10 @@
 //! leaves larger errors than no over-relaxation.
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::{Passes, Schedule};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::{Passes, Schedule};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

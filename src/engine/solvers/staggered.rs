@@ -14,7 +14,7 @@
 //! the solution of `pgs`): `cargo test --release --test lab agree`.
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and in each of `velocity_iterations` rounds up to 2 `inner` times 3 passes
-//! over vectors in lanes. Sweeps of a step request 44059 B per contact.
+//! over vectors in lanes.
 //!
 //! **Fails when** the load and the friction of a point depend strongly on each other, as under a leaning rod:
 //! a round then gains no more than a sweep. Also when `inner` is too small for the height of a pile.
@@ -28,17 +28,17 @@
 //!
 //! At a fixed point, λn is complementary to un, and λt dissipates the most energy.
 //!
-//! [`spectral`]: crate::engine::constraints::vectors::spectral
+//! [`spectral`]: crate::constraints::vectors::spectral
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::kernels::velocity::sweep::Sweep;
-use crate::engine::constraints::records::point_vector::{PointEntry, Wide};
-use crate::engine::constraints::vectors::spectral::{Axes, ImpulseProblem, SpectralDescent};
-use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
-use crate::engine::lanes::Lanes;
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::kernels::velocity::sweep::Sweep;
+use crate::constraints::records::point_vector::{PointEntry, Wide};
+use crate::constraints::vectors::spectral::{Axes, ImpulseProblem, SpectralDescent};
+use crate::constraints::{ImpactLaw, Passes, Schedule};
+use crate::lanes::Lanes;
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

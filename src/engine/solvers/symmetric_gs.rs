@@ -13,17 +13,17 @@
 //! lab agree`. Departures, and how far each moves the result: rows of a contact keep their order on the way
 //! back (source: reversed): 30 %.
 //!
-//! **Cost.** That of [`super::pgs`]; an iteration is two sweeps. Sweeps of a step request 1750 B per contact.
+//! **Cost.** That of [`super::pgs`]; an iteration is two sweeps.
 //!
 //! **Fails when** [`super::pgs`] does. In natural order, the error of a column of discs shrinks to 0.957 of
 //! its size per iteration, and to 0.976 per plain sweep: no gain per sweep. In colored order, changes travel
 //! one contact per sweep in either direction.
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::{Passes, Schedule, SweepOrder};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::{Passes, Schedule, SweepOrder};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -13,17 +13,16 @@
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start, `velocity_iterations` soft sweeps and
 //! `relax_iterations` rigid ones. As Jacobians move, impulses are applied again by a pass over
-//! constraints in every substep; [`super::soft_step`] needs a pass over bodies for it. Sweeps of a step request
-//! 2216 B per contact.
+//! constraints in every substep; [`super::soft_step`] needs a pass over bodies for it.
 //!
 //! **Fails when** [`super::soft_step`] does. The benefit shows only where bodies turn by more than a few
 //! degrees within a step; the cost is always paid.
 
 use super::{Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::{Soft, angular_frequencies};
-use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
-use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::{Soft, angular_frequencies};
+use crate::constraints::{ImpactLaw, Passes, Schedule};
+use crate::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

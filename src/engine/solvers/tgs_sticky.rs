@@ -18,18 +18,18 @@
 //!
 //! **Cost.** Per substep 2 body passes and `velocity_iterations` sticky sweeps; per step
 //! `relax_iterations` sticky sweeps without push, 1 pass that brings drifts into the order of the lanes and 1 that
-//! books them. Sweeps of a step request 1292 B per contact.
+//! books them.
 //!
 //! **Fails when** stacks are tall: there is no warm start, so each step begins cold, and in every substep 0.8
 //! of an overlap is pushed out through velocities.
 
 use super::{Law, Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::sticky::Sticky;
-use crate::engine::constraints::records::kept::KeptSize;
-use crate::engine::constraints::step::Drifts;
-use crate::engine::constraints::{ImpactLaw, Passes, Solver};
-use crate::engine::params::{Budget, LINEAR_SLOP, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::sticky::Sticky;
+use crate::constraints::records::kept::KeptSize;
+use crate::constraints::step::Drifts;
+use crate::constraints::{ImpactLaw, Passes, Solver};
+use crate::params::{Budget, LINEAR_SLOP, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -109,9 +109,5 @@ impl Solver for TgsSticky {
 
     fn boxed(&self) -> Box<dyn Solver> {
         Box::new(self.clone())
-    }
-
-    fn held_bytes(&self) -> usize {
-        self.drifts.held_bytes()
     }
 }

@@ -1,15 +1,15 @@
 //! Updates contacts from candidates and carries their impulses from step to step.
 
 use super::World;
-use crate::engine::constraints::Solver;
-use crate::engine::constraints::step::{Collision, CollisionScene};
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{Quad, held};
-use crate::engine::narrowphase::Margins;
-use crate::engine::narrowphase::batch::{self, Input, Jobs, NO_CONTACT, PairKind, Shapes};
-use crate::engine::narrowphase::candidate::{Candidate, Candidates};
-use crate::engine::narrowphase::circles::Rolling;
-use crate::engine::narrowphase::lanes::PoseRow;
+use crate::constraints::Solver;
+use crate::constraints::step::{Collision, CollisionScene};
+use crate::contacts::Contact;
+use crate::lanes::Quad;
+use crate::narrowphase::Margins;
+use crate::narrowphase::batch::{self, Input, Jobs, NO_CONTACT, PairKind, Shapes};
+use crate::narrowphase::candidate::{Candidate, Candidates};
+use crate::narrowphase::circles::Rolling;
+use crate::narrowphase::lanes::PoseRow;
 use glam::Vec2;
 
 /// State of the narrow phase between steps.
@@ -169,26 +169,9 @@ impl Narrow {
         &self.poses
     }
 
-    /// Bytes held for candidates.
-    pub fn candidate_bytes(&self) -> usize {
-        let lists: usize = self.of_kind.iter().map(held).sum();
-        let jobs: usize = self.jobs.iter().map(Jobs::held_bytes).sum();
-        lists
-            + jobs
-            + held(&self.candidates)
-            + held(&self.last_candidates)
-            + held(&self.poses)
-            + held(&self.ways)
-            + held(&self.asked.keep)
-    }
-
-    /// Bytes held for contacts, without the list itself.
-    pub fn contact_bytes(&self) -> usize {
-        held(&self.fresh) + held(&self.last_contacts)
-    }
-
     /// Links candidates to their contacts in a list that replaced the last one. Both are sorted by shape
     /// pair. Contacts without a candidate are dropped.
+    #[cfg(feature = "serde")]
     pub fn relink(&mut self, contacts: &mut Vec<Contact>) {
         self.last_contacts.clone_from(contacts);
         let mut last = self.last_contacts.iter().enumerate().peekable();

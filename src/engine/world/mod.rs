@@ -4,21 +4,21 @@
 //! bounds → pairs → manifolds → colors → records → solver stages → impulses, poses
 //! ```
 
-use crate::engine::bodies::Bodies;
-use crate::engine::broadphase::{BroadPhase, FatBoxes, Proxy, Region};
-use crate::engine::clock::{Clock, Phase, PhaseFilter, Timings};
-use crate::engine::constraints::kernels::motion::{self, MotionInput};
-use crate::engine::constraints::kernels::observe::ObservedRule;
-use crate::engine::constraints::step::assign::Assignment;
-use crate::engine::constraints::{Features, ImpactLaw, Solver, StepInput, WorkCount, Workspace};
-use crate::engine::contacts::Contact;
-use crate::engine::continuous::{Continuous, Moving};
-use crate::engine::lanes::LaneWidth;
-use crate::engine::narrowphase::Margins;
-use crate::engine::narrowphase::lanes::{Class, PoseRow};
-use crate::engine::params::DIVERGED_SPEED;
-use crate::engine::shapes::Shape;
-use crate::engine::solvers::{self, Variant};
+use crate::bodies::Bodies;
+use crate::broadphase::{BroadPhase, FatBoxes, Proxy, Region};
+use crate::clock::{Clock, Phase, Timings};
+use crate::constraints::kernels::motion::{self, MotionInput};
+use crate::constraints::kernels::observe::ObservedRule;
+use crate::constraints::step::assign::Assignment;
+use crate::constraints::{Features, ImpactLaw, Solver, StepInput, WorkCount, Workspace};
+use crate::contacts::Contact;
+use crate::continuous::{Continuous, Moving};
+use crate::lanes::LaneWidth;
+use crate::narrowphase::Margins;
+use crate::narrowphase::lanes::{Class, PoseRow};
+use crate::params::DIVERGED_SPEED;
+use crate::shapes::Shape;
+use crate::solvers::{self, Variant};
 use collide::Narrow;
 use edit::{Slots, StandingForces};
 use events::Events;
@@ -31,10 +31,8 @@ mod collide;
 mod counts;
 mod edit;
 mod events;
-mod held;
 mod joints;
 mod lanes;
-mod memory;
 mod pairs;
 mod queries;
 #[cfg(feature = "serde")]
@@ -44,9 +42,7 @@ mod traits;
 
 pub use counts::{Criterion, Divergence, Quantity, StepCounts};
 pub use events::{ContactEvent, ContactPoint};
-pub use held::{HeldWorld, Probe};
 pub use joints::SolvedBlock;
-pub use memory::{Component, Memory};
 pub use queries::{Queries, RayHit};
 pub use settings::{Order, Settings};
 
@@ -70,8 +66,7 @@ struct Surface {
 /// A clone continues bit-identically. A `watch` on iterations is not cloned.
 ///
 /// ```
-/// # use simpulse_engine as simpulse;
-/// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, lanes::LaneWidth, solvers, world::{Settings, World}};
+/// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, lanes::LaneWidth, solvers, world::{Settings, World}};
 /// // A stack, at one lane and at the widest: the same bits.
 /// let mut hashes = Vec::new();
 /// for width in [LaneWidth::W1, LaneWidth::W16] {
@@ -299,7 +294,7 @@ impl World {
         clock.lap(Phase::Color);
         self.load_rows();
         clock.lap(Phase::Prepare);
-        let count = self.run_solver(clock, PhaseFilter::ALL);
+        let count = self.run_solver(clock);
         let WorkCount { sweeps, row_updates, impact_visits, cut_impacts, unsolved } = count;
         self.counts = StepCounts { sweeps, row_updates, impact_visits, cut_impacts, unsolved, ..self.counts };
     }
@@ -326,7 +321,7 @@ impl World {
     }
 
     /// Runs the solver's stages on the prepared rows and lanes.
-    fn run_solver(&mut self, clock: &mut Clock, phases: PhaseFilter) -> WorkCount {
+    fn run_solver(&mut self, clock: &mut Clock) -> WorkCount {
         let (s, width) = (&self.settings, self.lane_width());
         let input = StepInput {
             features: self.kernel_features(),
@@ -335,7 +330,6 @@ impl World {
             length_unit: s.length_unit,
             parameters: s.scaled_parameters(),
             without: s.without,
-            phases,
             record_impulses: s.record_impulses || s.contact_events,
             impacts: s.impact_law(),
             points: self.counts.points,

@@ -237,8 +237,4 @@ pub const TABLE: &[AgreementEntry] = &[
         ..entry("physx", Against::Method(by::physx), "4 substeps, 1 velocity iteration at the end")
     },
     entry("jolt", Against::Method(by::jolt), "10 velocity and 2 position iterations"),
-    AgreementEntry {
-        why: "its sweeps and coarse problems end at the solution of `pgs`",
-        ..entry("two_level", Against::Solution(by::solution), "until a residual is reached")
-    },
 ];

@@ -9,7 +9,7 @@ use super::rows::FrozenJoints;
 use super::setup;
 use super::warm::STEPS;
 use crate::engine::bodies::Bodies;
-use crate::engine::clock::{Clock, PhaseFilter};
+use crate::engine::clock::Clock;
 use crate::engine::constraints::kernels::motion::{Integrator, MotionInput, RotationUpdate};
 use crate::engine::constraints::kernels::observe::ObservedRule;
 use crate::engine::constraints::kernels::velocity::rules::Softness;
@@ -169,7 +169,6 @@ impl<'a> Replay<'a> {
         let budget =
             Budget { substeps: 1, velocity_iterations: 0, relax_iterations: 0, position_iterations: 0 };
         let points = contacts.iter().map(|c| c.manifold.count as usize).sum();
-        let phases = PhaseFilter::ALL;
         let record_impulses = false;
         let input = StepInput {
             features,
@@ -178,7 +177,6 @@ impl<'a> Replay<'a> {
             length_unit: 1.0,
             parameters,
             without: Without::default(),
-            phases,
             record_impulses,
             impacts: ImpactLaw::None,
             points,

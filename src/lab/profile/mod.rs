@@ -1,104 +1,79 @@
 #![doc = include_str!("README.md")]
 //! # How it measures
 //!
-//! A phase is repeated on a frozen state ([`crate::engine::world::HeldWorld`]), in turn with loops that
+//! Whole steps are timed by phase, from the same settled state in every round, in turn with loops that
 //! measure the limits of memory and arithmetic units ([`ceilings`]), so a slow spell of the machine affects
-//! all of them alike. Its operations are counted by running the same kernel source on a lane that counts
-//! ([`crate::engine::lanes::Counted`]). Its bytes follow from the layout ([`traffic`]).
+//! all of them alike. Bytes and operations of a pass follow from the layout of its records ([`model`]).
 //!
 //! # The roofline
 //!
 //! A pass of F operations that moves D bytes takes at least max(F/P, D/B), where P is the rate of
-//! arithmetic and B the bandwidth of the level that holds its working set; so its rate is at most
-//! min(P, I B) with the intensity I = F/D. Source: `williams2009`.
+//! arithmetic and B the bandwidth of the level that holds its working set. Source: `williams2009`.
 
 pub mod ceilings;
-pub mod growth;
-pub mod growth_report;
-pub mod islands;
-pub mod limit;
-pub mod records;
-pub mod roofline;
+pub mod model;
 pub mod text;
-pub mod traffic;
 pub mod waiting;
 
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Impacts;
-use crate::engine::world::{HeldWorld, Probe, StepCounts};
+use crate::engine::world::{StepCounts, World};
+use crate::lab::error::Error;
+use crate::lab::metrics::Errors;
+use crate::lab::report::environment::Environment;
 use crate::lab::study::sample::median;
-use ceilings::{Buffer, MemoryLevel, levels, multiply_adds};
+use ceilings::{Buffer, multiply_adds};
+use model::PassWork;
+use serde_json::{Value, json};
 use std::time::{Duration, Instant};
-use traffic::Traffic;
-
-/// Options of a profile.
-#[derive(Clone, Debug)]
-pub struct ProfileOptions {
-    /// Phases, which take turns.
-    pub phases: Vec<Phase>,
-    /// Time of the whole measurement (s).
-    pub seconds: f64,
-    /// Whether to measure the machine's ceilings too. Without it, only the phases run.
-    pub ceilings: bool,
-}
-
-/// Bandwidth of one working set (GB/s).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Bandwidth {
-    /// Reading.
-    pub read: f64,
-    /// Reading and writing back; bytes of both count.
-    pub update: f64,
-}
-
-impl Bandwidth {
-    /// Bandwidth for traffic of this mix (bytes per nanosecond).
-    ///
-    /// Half of an update's bytes are written. So traffic with a fraction w of written bytes consists of a
-    /// fraction 2w of updates and 1 − 2w of reads, and their times add up.
-    pub fn of_mix(&self, traffic: &Traffic) -> f64 {
-        let updates = (2.0 * traffic.written / traffic.total().max(1.0)).min(1.0);
-        1.0 / (updates / self.update + (1.0 - updates) / self.read)
-    }
-}
 
 /// Measurements of one phase.
 #[derive(Clone, Debug)]
 pub struct PhaseReport {
-    /// The phase, with its passes in a step.
-    pub probe: Probe,
-    /// Traffic of one pass (bytes).
-    pub traffic: Traffic,
+    /// The phase.
+    pub phase: Phase,
+    /// Passes per step: sweeps or body passes; 1 for a phase that runs once.
+    pub passes: f64,
+    /// Rows solved per pass; 0 for a phase that solves none.
+    pub rows: usize,
     /// Median time of a pass (ns).
     pub pass_ns: f64,
     /// Mean time of a pass (ns).
     pub mean_ns: f64,
-    /// Longest time of a pass, over pieces that were timed as a whole (ns).
+    /// Longest time of a pass, as the mean over its step (ns).
     pub longest_ns: f64,
     /// Median deviation from the median (ns).
     pub spread_ns: f64,
-    /// Number of timed passes.
-    pub passes: u64,
-    /// Bandwidth of a buffer as large as the working set.
-    pub bandwidth: Option<Bandwidth>,
-    /// Floating-point operations of one pass, if it works on lanes.
-    pub flops: Option<f64>,
+    /// Bytes and operations of one pass; `None` if they are not known for this solver.
+    pub work: Option<PassWork>,
+    /// Read bandwidth of a buffer as large as the working set (GB/s).
+    pub peak_bandwidth: Option<f64>,
 }
 
+/// A pass that reaches this fraction of a ceiling is bound by it (1).
+const REACHED: f64 = 0.5;
+
 impl PhaseReport {
-    /// Requested bytes per nanosecond (GB/s).
-    pub fn bytes_rate(&self) -> f64 {
-        self.traffic.total() / self.pass_ns
+    /// Fractions of the bandwidth and of the arithmetic ceiling that are reached (1).
+    pub fn reached(&self, multiply_adds: Option<f64>) -> [Option<f64>; 2] {
+        let rate = |amount: f64, peak: f64| amount / self.pass_ns / peak;
+        [
+            self.work.zip(self.peak_bandwidth).map(|(work, peak)| rate(work.bytes(), peak)),
+            self.work.and_then(|work| work.flops).zip(multiply_adds).map(|(flops, peak)| rate(flops, peak)),
+        ]
     }
 
-    /// Operations per nanosecond (GFLOP/s).
-    pub fn flops_rate(&self) -> Option<f64> {
-        Some(self.flops? / self.pass_ns)
-    }
-
-    /// Operations per byte.
-    pub fn intensity(&self) -> Option<f64> {
-        Some(self.flops? / self.traffic.total()).filter(|i| i.is_finite())
+    /// The limit of the pass in terms of the roofline; `None` if it is not known.
+    pub fn limit(&self, multiply_adds: Option<f64>) -> Option<&'static str> {
+        match self.reached(multiply_adds) {
+            [None, _] => None,
+            [Some(memory), None] if memory < REACHED => Some("latency- or compute-bound"),
+            [Some(memory), arithmetic] => match arithmetic.unwrap_or(0.0) {
+                arithmetic if memory.max(arithmetic) < REACHED => Some("latency-bound"),
+                arithmetic if arithmetic > memory => Some("compute-bound"),
+                _ => Some("bandwidth-bound"),
+            },
+        }
     }
 }
 
@@ -117,166 +92,162 @@ pub struct ProfileReport {
     pub substeps: u32,
     /// Bodies of the scene.
     pub bodies: usize,
-    /// Counts of the frozen step.
+    /// Whether the scene has constraints other than contacts, whose operations are not counted.
+    pub has_joints: bool,
+    /// Counts of the last step.
     pub counts: StepCounts,
     /// Phases in the order of a step.
     pub phases: Vec<PhaseReport>,
-    /// Bandwidth of each level of memory.
-    pub levels: Vec<(MemoryLevel, Bandwidth)>,
     /// Rate of multiply-adds at the width of the run (GFLOP/s).
     pub multiply_adds: Option<f64>,
-    /// Fraction of the time spent restoring the state between the timed repeats.
-    pub reset_share: f64,
-    /// Time of the measurement (s).
-    pub seconds: f64,
-    /// Fraction of that time in which the thread waited for a processor, if known.
+    /// Number of timed steps.
+    pub steps: usize,
+    /// Fraction of the time in which the thread waited for a processor, if known.
     pub waiting: Option<f64>,
+    /// Errors of the steps that settled the scene.
+    pub errors: Option<Errors>,
 }
 
-/// Repeats between two resets: few enough that the state does not drift far. A reset costs about as much as
-/// one repeat.
-const REPEATS: u32 = 100;
-/// Time of a phase in one round.
-const TURN: Duration = Duration::from_millis(50);
-/// Repeats are timed in pieces of about this length, as the ceilings are. Most pieces are shorter than the
-/// time slices of a busy machine, so their median contains no pause.
-const PIECE: Duration = Duration::from_micros(500);
+/// Timed steps in a round. The state is restored after each, so that the scene does not move far.
+const STEPS: usize = 20;
 /// Time of one ceiling in one round.
 const CEILING: Duration = Duration::from_micros(500);
 
-/// Samples of one phase.
-struct Entrant {
-    probe: Probe,
-    traffic: Traffic,
-    /// Repeats in a piece.
-    piece: u32,
-    pass_ns: Vec<f64>,
-    passes: u64,
-    read: Vec<f64>,
-    update: Vec<f64>,
-}
-
-/// Repeats phases in turn, and measures the ceilings between them.
+/// Times steps of a settled world for `seconds`, and measures the `ceilings` of the machine in between.
 ///
-/// Phases that are not in `probes` are left out.
-pub fn profile(
-    frozen: &mut HeldWorld<'_>,
-    probes: &[Probe],
-    scene: &str,
-    options: &ProfileOptions,
-) -> ProfileReport {
-    let mut entrants: Vec<Entrant> = probes
-        .iter()
-        .filter(|probe| options.phases.contains(&probe.phase))
-        .map(|&probe| Entrant {
-            probe,
-            traffic: traffic::of(frozen, &probe),
-            piece: 1,
-            pass_ns: Vec::new(),
-            passes: 0,
-            read: Vec::new(),
-            update: Vec::new(),
-        })
-        .collect();
-    let largest = entrants.iter().map(|e| e.traffic.working_set as usize).max().unwrap_or(0);
-    let levels = if options.ceilings { levels() } else { Vec::new() };
-    let mut buffer = Buffer::new(&levels, if options.ceilings { largest } else { 0 });
-    let mut level_rates = vec![[Vec::new(), Vec::new()]; levels.len()];
+/// Errors: the world diverges.
+pub fn profile(start: &World, scene: &str, seconds: f64, ceilings: bool) -> Result<ProfileReport, Error> {
+    let mut start = start.clone();
+    start.settings.timed = true;
+    let mut world = start.clone();
+    let stepped = |world: &mut World| world.step().map_err(|e| Error::invalid("scene", e.to_string()));
+    stepped(&mut world)?;
+    let works = Phase::ALL.map(|phase| model::of(&mut world, phase));
+    let sets = works.map(|work| work.map_or(0, |w| w.working_set as usize));
+    let mut buffer = Buffer::new(if ceilings { *sets.iter().max().unwrap_or(&0) } else { 0 });
+    let (mut times, mut peaks) = (vec![Vec::new(); Phase::ALL.len()], vec![Vec::new(); Phase::ALL.len()]);
     let mut arithmetic = Vec::new();
-    let width = frozen.world().lane_width();
-    let (start, mut resets, waited) = (Instant::now(), Duration::ZERO, waiting::waited());
-    loop {
-        for entrant in &mut entrants {
-            resets += entrant.turn(frozen, options.seconds);
-            if options.ceilings {
-                let bytes = entrant.traffic.working_set as usize;
-                entrant.read.push(buffer.read(bytes, CEILING));
-                entrant.update.push(buffer.update(bytes, CEILING));
+    let (mut laps, mut steps) = ([0; Phase::ALL.len()], 0);
+    let (begin, waited) = (Instant::now(), waiting::waited());
+    while steps == 0 || begin.elapsed().as_secs_f64() < seconds {
+        world.clone_from(&start);
+        // The first step after a copy finds cold caches.
+        stepped(&mut world)?;
+        for _ in 0..STEPS {
+            stepped(&mut world)?;
+            for (phase, times) in times.iter_mut().enumerate() {
+                laps[phase] += world.timings.laps[phase];
+                times.push(world.timings.phase_ns[phase] as f64);
             }
+            steps += 1;
         }
-        if options.ceilings {
-            for (level, [read, update]) in levels.iter().zip(&mut level_rates) {
-                read.push(buffer.read(level.bytes, CEILING));
-                update.push(buffer.update(level.bytes, CEILING));
+        if ceilings {
+            for (&set, peaks) in sets.iter().zip(&mut peaks).filter(|(set, _)| **set > 0) {
+                peaks.push(buffer.read(set, CEILING));
             }
-            arithmetic.push(multiply_adds(width, CEILING));
-        }
-        if start.elapsed().as_secs_f64() >= options.seconds {
-            break;
+            arithmetic.push(multiply_adds(world.lane_width(), CEILING));
         }
     }
-    let waiting = waiting::share(waited, start.elapsed());
-    let seconds = start.elapsed().as_secs_f64();
-    let world = frozen.world();
-    let contacts = world.counts.contacts as f64;
-    let bandwidth = |read: &[f64], update: &[f64]| Bandwidth { read: median(read), update: median(update) };
-    ProfileReport {
+    let waiting = waiting::share(waited, begin.elapsed());
+    let rows_per_point = if world.features().friction { 2 } else { 1 };
+    let report = |phase: Phase| {
+        let index = phase as usize;
+        let passes = match phase {
+            Phase::WarmStart | Phase::Solve | Phase::Relax | Phase::Position | Phase::Integrate => {
+                f64::from(laps[index]) / steps as f64
+            }
+            // Several laps, but one run.
+            _ => f64::from(laps[index].min(1)),
+        };
+        let pass_ns: Vec<f64> = times[index].iter().map(|time| time / passes).collect();
+        let middle = median(&pass_ns);
+        let deviations: Vec<f64> = pass_ns.iter().map(|t| (t - middle).abs()).collect();
+        let rows = match phase {
+            Phase::Solve | Phase::Relax => rows_per_point * world.counts.points,
+            Phase::Position | Phase::Restitution => world.counts.points,
+            _ => 0,
+        };
+        PhaseReport {
+            phase,
+            passes,
+            rows,
+            pass_ns: middle,
+            mean_ns: pass_ns.iter().sum::<f64>() / pass_ns.len() as f64,
+            longest_ns: pass_ns.iter().copied().fold(0.0, f64::max),
+            spread_ns: median(&deviations),
+            work: works[index],
+            peak_bandwidth: Some(median(&peaks[index])).filter(|&rate| rate > 0.0),
+        }
+    };
+    let phases = Phase::ALL.into_iter().filter(|&phase| laps[phase as usize] > 0).map(report).collect();
+    Ok(ProfileReport {
         scene: scene.to_string(),
         solver: world.settings.solver.name,
         impacts: world.settings.impacts,
-        lanes: width.lanes(),
+        lanes: world.lane_width().lanes(),
         substeps: world.settings.budget.substeps,
         bodies: world.bodies.len(),
+        has_joints: !world.workspace().types.is_empty(),
         counts: world.counts,
-        phases: entrants.iter().map(|e| e.report(contacts)).collect(),
-        levels: levels
-            .into_iter()
-            .zip(&level_rates)
-            .map(|(level, [read, update])| (level, bandwidth(read, update)))
-            .collect(),
-        multiply_adds: options.ceilings.then(|| median(&arithmetic)),
-        reset_share: resets.as_secs_f64() / seconds.max(1e-9),
-        seconds,
+        phases,
+        multiply_adds: ceilings.then(|| median(&arithmetic)),
+        steps,
         waiting,
-    }
+        errors: None,
+    })
 }
 
-impl Entrant {
-    /// One turn of the phase; returns the time spent on resets.
-    fn turn(&mut self, frozen: &mut HeldWorld<'_>, seconds: f64) -> Duration {
-        let (start, mut resets) = (Instant::now(), Duration::ZERO);
-        let turn = TURN.min(Duration::from_secs_f64(seconds));
-        while start.elapsed() < turn {
-            let mut left = REPEATS;
-            while left > 0 {
-                let times = self.piece.min(left);
-                let begin = Instant::now();
-                frozen.repeat(self.probe.phase, times);
-                let elapsed = begin.elapsed();
-                let passes = u64::from(times) * u64::from(self.probe.passes);
-                self.pass_ns.push(elapsed.as_nanos() as f64 / passes as f64);
-                self.passes += passes;
-                let fit = PIECE.as_nanos() as f64 / elapsed.as_nanos().max(1) as f64;
-                // The factor is limited: one pause must not make all pieces small, and a clock that stands
-                // still must not make one endless.
-                self.piece = (f64::from(times) * fit.clamp(0.5, 2.0)).clamp(1.0, f64::from(REPEATS)) as u32;
-                left -= times;
-            }
-            let begin = Instant::now();
-            frozen.reset(self.probe.phase);
-            resets += begin.elapsed();
-        }
-        resets
-    }
+/// All measurements as JSON.
+pub fn json(report: &ProfileReport) -> Value {
+    let phase = |p: &PhaseReport| {
+        let [bandwidth, arithmetic] = p.reached(report.multiply_adds);
+        json!({
+            "phase": p.phase.name(), "passes_per_step": p.passes, "rows": p.rows,
+            "median_pass_ns": p.pass_ns, "mean_pass_ns": p.mean_ns, "longest_pass_ns": p.longest_ns,
+            "spread_pass_ns": p.spread_ns,
+            "bytes_read": p.work.map(|w| w.read), "bytes_written": p.work.map(|w| w.written),
+            "working_set_bytes": p.work.map(|w| w.working_set), "flops": p.work.and_then(|w| w.flops),
+            "peak_gb_per_s": p.peak_bandwidth, "bandwidth_share": bandwidth, "arithmetic_share": arithmetic,
+            "limit": p.limit(report.multiply_adds),
+        })
+    };
+    json!({
+        "environment": Environment::current(),
+        "scene": report.scene, "solver": report.solver, "impacts": report.impacts.name(),
+        "lanes": report.lanes, "substeps": report.substeps, "bodies": report.bodies,
+        "contacts": report.counts.contacts, "points": report.counts.points, "colors": report.counts.colors,
+        "errors": report.errors, "timed_steps": report.steps,
+        "phases": report.phases.iter().map(phase).collect::<Vec<_>>(),
+        "peak_gflop_per_s": report.multiply_adds, "waited_share": report.waiting,
+    })
+}
 
-    fn report(&self, contacts: f64) -> PhaseReport {
-        let pass_ns = median(&self.pass_ns);
-        let deviations: Vec<f64> = self.pass_ns.iter().map(|t| (t - pass_ns).abs()).collect();
-        let probe = self.probe;
-        // Contacts without a color need as many operations as the others.
-        let all = if probe.counted_contacts > 0 { contacts / probe.counted_contacts as f64 } else { 1.0 };
-        let flops = probe.operations.map(|o| all * o.flops() as f64 / f64::from(probe.passes));
-        let bandwidth = Bandwidth { read: median(&self.read), update: median(&self.update) };
-        PhaseReport {
-            probe,
-            traffic: self.traffic,
-            pass_ns,
-            mean_ns: self.pass_ns.iter().sum::<f64>() / self.pass_ns.len().max(1) as f64,
-            longest_ns: self.pass_ns.iter().copied().fold(0.0, f64::max),
-            spread_ns: median(&deviations),
-            passes: self.passes,
-            bandwidth: (bandwidth.read > 0.0).then_some(bandwidth),
-            flops,
-        }
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lower_ceiling_binds_if_half_of_it_is_reached() {
+        let limit = |pass_ns: f64, flops: Option<f64>| {
+            let work = PassWork { read: 1000.0, written: 0.0, working_set: 1000.0, flops };
+            PhaseReport {
+                phase: Phase::Solve,
+                passes: 1.0,
+                rows: 1,
+                pass_ns,
+                mean_ns: pass_ns,
+                longest_ns: pass_ns,
+                spread_ns: 0.0,
+                work: Some(work),
+                // 100 ns at 10 GB/s.
+                peak_bandwidth: Some(10.0),
+            }
+            .limit(Some(2.0))
+        };
+        assert_eq!(limit(170.0, Some(10.0)), Some("bandwidth-bound"));
+        assert_eq!(limit(230.0, Some(10.0)), Some("latency-bound"));
+        // 400 operations take 200 ns.
+        assert_eq!(limit(250.0, Some(400.0)), Some("compute-bound"));
+        assert_eq!(limit(900.0, None), Some("latency- or compute-bound"));
     }
 }

@@ -263,35 +263,6 @@ pub static AGREE: Sheet = Sheet {
     ],
 };
 
-/// `growth.csv`
-pub static GROWTH: Sheet = Sheet {
-    file: "growth.csv",
-    command: "simpulse growth",
-    line: "a size of the scene",
-    columns: &[
-        column("scene", "", "name with its size"),
-        column("bodies", "", "bodies of the scene"),
-        column("pairs", "", "candidate pairs of the step"),
-        column("contacts", "", "contacts of the step"),
-        column("points", "", "contact points of the step"),
-        column("median_step_ns", "ns", "time of a step, median of the repeats"),
-        column("mean_step_ns", "ns", "their mean"),
-        column("longest_step_ns", "ns", "the longest of them"),
-        column("spread_step_ns", "ns", "median deviation from the median"),
-        column("<phase>_ns", "ns", "time of a phase, median"),
-        column("<phase>_spread_ns", "ns", "median deviation from it"),
-        column("<part>_held_bytes", "B", "memory that a part of the world holds"),
-        column("<part>_used_bytes", "B", "what of it is in use"),
-        column("penetration_max_m", "m", "greatest penetration of the last settling steps"),
-        column(
-            "residual_rms_scene_weights",
-            "1",
-            "residual of the rigid contact law, rms, over weight of the scene × step",
-        ),
-        column("residual_rms_body_weights", "1", "the same over mean weight of a body × step"),
-    ],
-};
-
 /// Columns of `run --state`.
 pub static STATE: Sheet = Sheet {
     file: "FILE of run --state",
@@ -366,7 +337,7 @@ pub static JOINTS: Sheet = Sheet {
 };
 
 /// All kinds of CSV files.
-pub static SHEETS: [&Sheet; 7] = [&STUDY, &CONVERGE, &AGREE, &GROWTH, &STATE, &CONTACTS, &JOINTS];
+pub static SHEETS: [&Sheet; 6] = [&STUDY, &CONVERGE, &AGREE, &STATE, &CONTACTS, &JOINTS];
 
 impl Sheet {
     /// Names of the columns, in order.
@@ -417,12 +388,6 @@ mod tests {
         assert!(!STATE.documents(&STATE.names()[1..]));
         let reversed: Vec<&str> = STATE.names().into_iter().rev().collect();
         assert!(!STATE.documents(&reversed));
-        let mut growth: Vec<&str> = GROWTH.names().into_iter().filter(|n| !n.starts_with('<')).collect();
-        growth.insert(7, "warm_start_spread_ns");
-        growth.insert(7, "solve_ns");
-        assert!(GROWTH.documents(&growth));
-        growth.insert(7, "solve_µs");
-        assert!(!GROWTH.documents(&growth));
     }
 
     #[test]

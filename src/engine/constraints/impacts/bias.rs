@@ -15,12 +15,12 @@
 //! Source: `catto2007box2d` (`b2ContactSolver`, velocity bias, Box2D 1 to 2.4).
 
 use super::restitution::{largest, point, restitution_of};
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::bounces::Bounces;
-use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, Lanes};
+use crate::constraints::kernels::pass::{Pass, PassInput};
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::bounces::Bounces;
+use crate::constraints::records::features::{KernelFeatures, Layout};
+use crate::contacts::Contact;
+use crate::lanes::{BodyRow, Lanes};
 
 /// Side record: per point u (m/s; zero if it does not bounce) and its effective mass (kg).
 pub(super) const fn stride(points: usize) -> usize {
@@ -43,11 +43,6 @@ pub struct FindBounces {
 pub struct BiasSweep;
 
 impl Pass for FindBounces {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        let read = 3 + layout.points * (layout.arms() + 4);
-        PerLane { halves: 0, ..PerLane::of_bodies(read, 3 * layout.points, opposite) }
-    }
-
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         on.bounces.reserve(on.batches.lanes(), stride(F::POINTS));
         on.batches.each_segment(F::layout, |batches, segment, layout| {
@@ -57,10 +52,6 @@ impl Pass for FindBounces {
 }
 
 impl Pass for BiasSweep {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        PerLane::of_bodies(2 + layout.points * (layout.arms() / 2 + 3), layout.points, opposite)
-    }
-
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         on.batches.each_segment(F::layout, |batches, segment, layout| {
             sweep::<L>(on.rows, batches, segment, layout, on.bounces);

@@ -8,8 +8,8 @@
 //! | [`ImpactLaw::Waves`] | bodies bounce before the step, wave by wave (`spread`) |
 //! | [`ImpactLaw::Solver`] | the solver's schedule does it |
 
-use crate::engine::constraints::records::bounces::Bounces;
-use crate::engine::params::RESTITUTION_THRESHOLD;
+use crate::constraints::records::bounces::Bounces;
+use crate::params::RESTITUTION_THRESHOLD;
 
 #[doc(hidden)]
 pub mod bias;
@@ -119,9 +119,4 @@ pub struct ImpactRecords {
     pub(crate) spread: spread::Spread,
 }
 
-impl ImpactRecords {
-    /// Bytes held.
-    pub fn held_bytes(&self) -> usize {
-        self.bounces.iter().map(Bounces::held_bytes).sum::<usize>() + self.spread.held_bytes()
-    }
-}
+impl ImpactRecords {}

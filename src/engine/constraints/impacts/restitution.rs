@@ -9,13 +9,13 @@
 //!
 //! Source: `catto2024box2d`.
 
-use crate::engine::constraints::kernels::frame::turn;
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::bounces::Bounces;
-use crate::engine::constraints::records::features::{KernelFeatures, Layout, LayoutOf, OppositeKind};
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, LaneIndex, Lanes};
+use crate::constraints::kernels::frame::turn;
+use crate::constraints::kernels::pass::{Pass, PassInput};
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::bounces::Bounces;
+use crate::constraints::records::features::{KernelFeatures, Layout, LayoutOf};
+use crate::contacts::Contact;
+use crate::lanes::{BodyRow, LaneIndex, Lanes};
 
 /// Side record: per point the rebound speed (m/s; zero if it does not bounce) and the largest normal impulse
 /// so far (N·s).
@@ -43,12 +43,6 @@ pub struct ReadApproach {
 }
 
 impl Pass for ReadApproach {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        let bounce = 2 * layout.points;
-        let read = 2 + layout.points * (layout.arms() + 1);
-        PerLane { halves: 0, ..PerLane::of_bodies(read, bounce, opposite) }
-    }
-
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         let most = prepare::<L, F>(on.rows, on.batches, on.bounces, on.contacts, self);
         self.found = self.found.max(most);
@@ -59,10 +53,6 @@ impl Pass for ReadApproach {
 pub struct Track;
 
 impl Pass for Track {
-    fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
-        PerLane { floats_read: 2 * layout.points, floats_written: layout.points, ..PerLane::default() }
-    }
-
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         track::<L, F>(on.batches, on.bounces);
     }
@@ -72,14 +62,6 @@ impl Pass for Track {
 pub struct Apply;
 
 impl Pass for Apply {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        // Bodies are gathered twice per point: to read and to push.
-        let read = 3 + layout.points * (layout.arms() + 5);
-        let once = PerLane::of_bodies(read, layout.points, opposite);
-        let rows = layout.points * (once.rows + once.halves);
-        PerLane { rows, halves: layout.points * once.halves, ..once }
-    }
-
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         apply::<L, F>(on.rows, on.batches, on.bounces);
     }

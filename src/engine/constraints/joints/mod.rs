@@ -8,14 +8,14 @@ pub mod chains;
 pub(crate) mod passes;
 pub mod rows;
 
-use crate::engine::bodies::Bodies;
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W};
-use crate::engine::constraints::kernels::pass::{PassMode, PassWidth, VectorTask, at_pass_width, at_width};
-use crate::engine::constraints::kernels::types::{Booked, ConstraintType, Placed, TypeInput, TypeRows};
-use crate::engine::constraints::records::links::{ChainLink, LinkImpulses, LinkRows, LinkRule};
-use crate::engine::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowStore, held};
-use crate::engine::narrowphase::lanes::PoseRow;
+use crate::bodies::Bodies;
+use crate::clock::Phase;
+use crate::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W};
+use crate::constraints::kernels::pass::{PassMode, VectorTask, at_width};
+use crate::constraints::kernels::types::{Booked, ConstraintType, Placed, TypeInput, TypeRows};
+use crate::constraints::records::links::{ChainLink, LinkImpulses, LinkRows, LinkRule};
+use crate::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowStore};
+use crate::narrowphase::lanes::PoseRow;
 use chains::records::Linked;
 use glam::Vec2;
 use passes::{
@@ -326,17 +326,16 @@ impl<T: JointType> Joints<T> {
         self.velocity_pass::<L, _>(on, |pair| Velocities { pair, by });
     }
 
-    /// A velocity pass that skips the rigid rows of links. Passes with links are not counted, so the counting
-    /// instance does not handle them.
+    /// A velocity pass that skips the rigid rows of links.
     fn velocity_pass<L: Lanes, P: JointPass<L> + DerefMut>(
         &self,
         on: TypeInput<'_>,
         of: impl Fn(JointPair<L>) -> P,
     ) {
-        if const { L::COUNTS } || !self.linked.is_active() {
-            self.pass::<L, _>(on, false, of)
-        } else {
+        if self.linked.is_active() {
             self.pass_besides::<L, _>(on, of)
+        } else {
+            self.pass::<L, _>(on, false, of)
         }
     }
 
@@ -488,9 +487,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
     }
 
     fn run(&mut self, on: TypeInput<'_>) {
-        let width = on.width.width;
-        // Sweeps are not counted if there are links.
-        let swept = PassWidth { counted: on.width.counted && !self.linked.is_active(), ..on.width };
+        let width = on.width;
         let inv_h = 1.0 / on.h;
         match (on.phase, on.mode) {
             (_, PassMode::Masses) => {}
@@ -504,14 +501,14 @@ impl<T: JointType> ConstraintType for Joints<T> {
             }
             (Phase::Prepare, _) => at_width!(width, Self::fill(self, on)),
             (Phase::Store, _) => at_width!(width, Self::store(self, on)),
-            (Phase::WarmStart, _) => at_pass_width!(swept, Self::warm_start(self, on)),
+            (Phase::WarmStart, _) => at_width!(width, Self::warm_start(self, on)),
             (_, PassMode::Position { max_correction, impulses }) => {
                 let by =
                     DisplacementRule::Position { max_correction, inv_h: if impulses { inv_h } else { 0.0 } };
-                at_pass_width!(swept, Self::displace(self, by, on))
+                at_width!(width, Self::displace(self, by, on))
             }
             (Phase::Position, _) => {
-                at_pass_width!(swept, Self::displace(self, DisplacementRule::Push { law: on.law }, on))
+                at_width!(width, Self::displace(self, DisplacementRule::Push { law: on.law }, on))
             }
             (Phase::Solve | Phase::Relax, mode) => {
                 let by = VelocityRule {
@@ -524,7 +521,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
                     relaxation: if let PassMode::Jacobi { relaxation } = mode { relaxation } else { 1.0 },
                     inv_h,
                 };
-                at_pass_width!(swept, Self::sweep(self, by, on))
+                at_width!(width, Self::sweep(self, by, on))
             }
             _ => {}
         }
@@ -574,17 +571,6 @@ impl<T: JointType> ConstraintType for Joints<T> {
 
     fn angle(&self, constraint: usize) -> f32 {
         self.angles[constraint]
-    }
-
-    fn held_bytes(&self) -> usize {
-        held(&self.joints)
-            + held(&self.ends)
-            + held(&self.anchors)
-            + held(&self.numbers)
-            + held(&self.kept)
-            + held(&self.summed)
-            + held(&self.angles)
-            + self.linked.held_bytes()
     }
 
     fn boxed(&self) -> Box<dyn ConstraintType> {

@@ -9,9 +9,9 @@
 //! Explicit Euler updates x with the old v; the last factor is then (1 − 1/n), and every orbit gains energy.
 //! Damping of rate c is integrated implicitly, v ← v/(1 + h c), which is stable for any h.
 
-use crate::engine::bodies::{Bodies, BodyKind};
-use crate::engine::constraints::records::features::Features;
-use crate::engine::lanes::{BodyRow, held};
+use crate::bodies::{Bodies, BodyKind};
+use crate::constraints::records::features::Features;
+use crate::lanes::BodyRow;
 use glam::Vec2;
 use wide::{f32x4, f32x8};
 
@@ -117,11 +117,6 @@ impl Motion {
             self.damp.push([1.0; 4]);
         }
         self.free.resize(count + 1, [0.0; 4]);
-    }
-
-    /// Allocated bytes.
-    pub fn held_bytes(&self) -> usize {
-        held(&self.velocity_increment) + held(&self.damp) + held(&self.free) + held(&self.round)
     }
 
     /// Velocity increments in free flight per substep: `[h aₓ, h a_y, h α, 0]` per row.

@@ -4,13 +4,13 @@
 //! once. Kernels implement the generic [`Pass`]; schedules use [`AnyPass`]. The instance is chosen once per
 //! pass, outside of all loops.
 
-use crate::engine::constraints::kernels::velocity::rules::Softness;
-use crate::engine::constraints::records::batches::{Batches, Part};
-use crate::engine::constraints::records::bounces::Bounces;
-use crate::engine::constraints::records::features::{Features, Kernel, KernelFeatures, Layout, OppositeKind};
-use crate::engine::constraints::records::kept::Kept;
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, LaneWidth, Lanes};
+use crate::constraints::kernels::velocity::rules::Softness;
+use crate::constraints::records::batches::{Batches, Part};
+use crate::constraints::records::bounces::Bounces;
+use crate::constraints::records::features::{Features, Kernel, KernelFeatures};
+use crate::constraints::records::kept::Kept;
+use crate::contacts::Contact;
+use crate::lanes::{BodyRow, LaneWidth, Lanes};
 
 /// Input of a pass: the rows of all bodies and one set of batches.
 pub struct PassInput<'a> {
@@ -28,36 +28,6 @@ pub struct PassInput<'a> {
     pub kept: &'a mut Kept,
     /// Velocity increments in free flight per substep, `[h aₓ, h a_y, h α, 0]` per row.
     pub increments: &'a [[f32; 4]],
-}
-
-/// Memory accesses of a pass per contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PerLane {
-    /// Floats read from records.
-    pub floats_read: usize,
-    /// Floats written to records.
-    pub floats_written: usize,
-    /// Body rows gathered (32 B each).
-    pub rows: usize,
-    /// Half rows written back (16 B each).
-    pub halves: usize,
-}
-
-impl PerLane {
-    /// A pass that gathers the bodies of a contact once and writes back half a row of each body that moves.
-    pub fn of_bodies(floats_read: usize, floats_written: usize, opposite: OppositeKind) -> Self {
-        let rows = 1 + usize::from(opposite != OppositeKind::Static);
-        let halves = 1 + usize::from(opposite == OppositeKind::Dynamic);
-        PerLane { floats_read, floats_written, rows, halves }
-    }
-
-    /// A velocity sweep. Reads normal and friction, and arms, separation, masses and impulses of each point.
-    pub fn of_sweep(layout: &Layout, friction: bool, opposite: OppositeKind) -> Self {
-        let friction = layout.has_friction && friction;
-        let impulses = if friction { 2 } else { 1 };
-        let read = 2 + usize::from(friction) + layout.points * (layout.arms() + 1 + 2 * impulses);
-        Self::of_bodies(read, layout.points * impulses, opposite)
-    }
 }
 
 /// How a pass accesses bodies. Kernels of other constraint types follow it.
@@ -94,7 +64,7 @@ pub enum PassMode {
 }
 
 /// Task of a pass between impulses λ, a vector x and in some tasks a second vector y.
-/// [`rows`](crate::engine::constraints::joints::rows) defines b and R.
+/// [`rows`](crate::constraints::joints::rows) defines b and R.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VectorTask {
     /// x = λ
@@ -130,28 +100,11 @@ macro_rules! at_width {
 }
 pub(crate) use at_width;
 
-/// As [`at_width`], for the lanes of a [`PassWidth`].
-macro_rules! at_pass_width {
-    ($width:expr, $($pass:ident)::+($($arg:expr),*)) => {
-        match $width {
-            #[cfg(feature = "count")]
-            PassWidth { counted: true, width: LaneWidth::W1 } => {
-                $($pass)::+::<$crate::engine::lanes::Counted>($($arg),*)
-            }
-            PassWidth { width, .. } => at_width!(width, $($pass)::+($($arg),*)),
-        }
-    };
-}
-pub(crate) use at_pass_width;
-
 /// A pass over contacts, compiled per width and features.
 ///
-/// To add one, implement this trait; [`crate::engine::constraints::kernels::velocity::sweep::Sweep`] is an
+/// To add one, implement this trait; [`crate::constraints::kernels::velocity::sweep::Sweep`] is an
 /// example.
 pub trait Pass {
-    /// Memory accesses per contact with records of this layout.
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane;
-
     /// How constraints of other types take part.
     fn mode(&self) -> PassMode {
         PassMode::InTurn
@@ -184,20 +137,8 @@ pub trait Pass {
     }
 }
 
-/// Lanes of a pass: a width, or one lane that counts its operations.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PassWidth {
-    /// Lanes per instruction.
-    pub width: LaneWidth,
-    /// Whether operations are counted; if so, the width is 1.
-    pub counted: bool,
-}
-
-/// A type-erased [`Pass`], the argument of [`crate::engine::constraints::step::Passes::run`].
+/// A type-erased [`Pass`], the argument of [`crate::constraints::step::Passes::run`].
 pub trait AnyPass {
-    /// [`Pass::traffic`]
-    fn traffic_of(&self, layout: &Layout, opposite: OppositeKind) -> PerLane;
-
     /// [`Pass::mode`]
     fn mode_of(&self) -> PassMode;
 
@@ -208,14 +149,10 @@ pub trait AnyPass {
     fn sums_of(&mut self) -> &mut [BodyRow];
 
     /// Runs the instance compiled for this width and these features.
-    fn run_at(&mut self, width: PassWidth, features: &Features, on: PassInput<'_>);
+    fn run_at(&mut self, width: LaneWidth, features: &Features, on: PassInput<'_>);
 }
 
 impl<P: Pass> AnyPass for P {
-    fn traffic_of(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        self.traffic(layout, opposite)
-    }
-
     fn mode_of(&self) -> PassMode {
         self.mode()
     }
@@ -228,7 +165,7 @@ impl<P: Pass> AnyPass for P {
         self.sums()
     }
 
-    fn run_at(&mut self, width: PassWidth, features: &Features, on: PassInput<'_>) {
-        at_pass_width!(width, Self::run_with(self, features, on))
+    fn run_at(&mut self, width: LaneWidth, features: &Features, on: PassInput<'_>) {
+        at_width!(width, Self::run_with(self, features, on))
     }
 }

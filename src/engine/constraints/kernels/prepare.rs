@@ -1,14 +1,14 @@
 //! Fills constraint records from contacts at the start of a step, and stores impulses in the contacts at its
 //! end.
 
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::kernels::stages::over_segments;
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::features::{
+use crate::constraints::kernels::pass::{Pass, PassInput};
+use crate::constraints::kernels::stages::over_segments;
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::contacts::{Contact, quad};
-use crate::engine::lanes::{BodyRow, Lanes, Quad, prefetch_records};
+use crate::contacts::{Contact, quad};
+use crate::lanes::{BodyRow, Lanes, Quad, prefetch_records};
 
 const INV_MASS: usize = 3;
 const INV_INERTIA: usize = 7;
@@ -110,11 +110,6 @@ fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
 pub struct Prepare;
 
 impl Pass for Prepare {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        // Reads the index of the contact and the masses of the bodies.
-        PerLane { halves: 0, ..PerLane::of_bodies(1, layout.stride, opposite) }
-    }
-
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         prepare::<L, F>(on.rows, on.batches, on.contacts);
@@ -135,11 +130,6 @@ pub fn prepare<L: Lanes, N: KernelFeatures>(
 pub struct Store;
 
 impl Pass for Store {
-    fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
-        let impulses = layout.points * if layout.has_friction { 2 } else { 1 };
-        PerLane { floats_read: 1 + impulses, ..PerLane::default() }
-    }
-
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         store::<L, F>(on.batches, on.contacts);
     }

@@ -1,6 +1,17 @@
 //! The friction cone |λt| ≤ µ λn of one contact point.
 
-use crate::engine::lanes::Lanes;
+use crate::lanes::Lanes;
+
+/// The impulse of a friction row (N·s): `wanted`, but at most `bound` = µ λn in either direction.
+#[inline(always)]
+pub fn friction<L: Lanes>(wanted: L, bound: L) -> L {
+    wanted.min(bound).max(-bound)
+}
+
+/// [`friction`] in `f64`.
+pub fn friction_f64(wanted: f64, bound: f64) -> f64 {
+    wanted.max(-bound).min(bound)
+}
 
 /// The nearest point of the cone. In the plane the cone is a wedge: a point inside it stays, a point
 /// inside its polar goes to the tip, and any other point goes to the nearer side, (1, ±µ) times

@@ -18,6 +18,7 @@
 //! the length of f. By the triangle inequality, a body then passes on no more than the weights of everything
 //! that it bears.
 
+use super::cone::friction_f64;
 use glam::{DVec2, DVec3};
 
 /// Added to the diagonal of A Aᵀ, whose entries are of the order of 1.
@@ -72,8 +73,7 @@ pub(crate) fn load(supports: &mut [Support], force: DVec2, torque: f64, gyration
         for support in supports.iter_mut().filter(|s| s.load[0] > 0.0) {
             let normal = column(support, support.normal).dot(solution).max(0.0);
             let tangent = support.load[0] * per_load * column(support, support.tangent()).dot(solution);
-            let bound = support.friction * normal;
-            support.load = [normal, tangent.max(-bound).min(bound)];
+            support.load = [normal, friction_f64(tangent, support.friction * normal)];
         }
     }
     let total: DVec2 = supports.iter().map(Support::force).sum();

@@ -1,10 +1,9 @@
 //! Assignment of contacts to lanes: batches, segments, and the buffer of records.
 
-use crate::engine::constraints::records::features::{Features, Layout, LayoutOf, OppositeKind};
-use crate::engine::constraints::records::order::SweepOrder;
-pub use crate::engine::constraints::records::segment::Segment;
-use crate::engine::lanes::{Block, IndexList, Indices, Lanes, held};
-use std::mem::size_of_val;
+use crate::constraints::records::features::{Features, Layout, LayoutOf, OppositeKind};
+use crate::constraints::records::order::SweepOrder;
+pub use crate::constraints::records::segment::Segment;
+use crate::lanes::{Block, IndexList, Indices, Lanes};
 use std::ops::Range;
 
 /// Attributes of a new [`Segment`] besides its records.
@@ -337,19 +336,6 @@ impl Batches {
             .map(|s| s.batches * self.width)
             .sum();
         4 * (self.vectors * self.width + 2 * self.contact.len() - static_lanes)
-    }
-
-    /// Bytes held and bytes in use, for each array.
-    pub fn memory(&self) -> [(usize, usize); 6] {
-        let of = |list: &Indices| (list.held_bytes(), size_of_val::<[u32]>(list));
-        [
-            (held(&self.segments), size_of_val(self.segments.as_slice())),
-            (held(&self.visits), size_of_val(self.visits.as_slice())),
-            of(&self.contact),
-            of(&self.row_a),
-            of(&self.row_b),
-            (held(&self.buffer), 4 * self.vectors * self.width),
-        ]
     }
 
     /// Calls `visit(contact, record, lane)` for every lane that holds a contact, where

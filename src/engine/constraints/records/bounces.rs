@@ -1,10 +1,10 @@
 //! Side records for restitution. Scenes in which nothing bounces have none.
 
-use crate::engine::constraints::records::segment::Segment;
-use crate::engine::lanes::{Block, Lanes, held};
+use crate::constraints::records::segment::Segment;
+use crate::lanes::{Block, Lanes};
 use std::slice::ChunksExactMut;
 
-/// Side records. The law of impacts defines their contents ([`crate::engine::constraints::impacts`]).
+/// Side records. The law of impacts defines their contents ([`crate::constraints::impacts`]).
 #[derive(Clone, Debug, Default)]
 pub struct Bounces {
     /// Lane vectors per record.
@@ -24,11 +24,6 @@ impl Bounces {
         records.expect("bounces of these batches: `prepare` makes them").chunks_exact_mut(stride)
     }
 
-    /// Whether there are side records.
-    pub(crate) fn are_prepared(&self) -> bool {
-        self.stride > 0
-    }
-
     /// Discards the side records.
     pub(crate) fn forget(&mut self) {
         self.stride = 0;
@@ -38,10 +33,5 @@ impl Bounces {
     pub(crate) fn reserve(&mut self, lanes: usize, stride: usize) {
         self.stride = stride;
         self.buffer.resize((lanes * stride).div_ceil(16), Block::default());
-    }
-
-    /// Bytes held.
-    pub fn held_bytes(&self) -> usize {
-        held(&self.buffer)
     }
 }

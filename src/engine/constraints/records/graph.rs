@@ -4,8 +4,6 @@
 //! (shock propagation). Built only for a solver that requests it, in time linear in contacts.
 //! Edges have the numbers of their contacts. The graph does not depend on what an edge stands for.
 
-use crate::engine::lanes::held;
-
 /// Level of a body that no chain of contacts connects to the ground.
 pub const UNSUPPORTED: u32 = u32::MAX;
 
@@ -132,12 +130,6 @@ impl Graph {
     /// Bodies that a chain of contacts connects to the ground, nearest first.
     pub fn upwards(&self) -> &[u32] {
         &self.queue
-    }
-
-    /// Bytes held.
-    pub fn held_bytes(&self) -> usize {
-        let lists = [&self.starts, &self.edges, &self.levels, &self.queue, &self.others];
-        held(&self.ends) + lists.into_iter().map(held).sum::<usize>()
     }
 }
 

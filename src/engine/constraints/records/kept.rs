@@ -4,8 +4,8 @@
 //! its shape pair and its feature id, as for its impulses. A new point starts with zeros. Solvers that keep
 //! nothing have empty arrays and cost no look-ups.
 
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{LaneVec, held};
+use crate::contacts::Contact;
+use crate::lanes::LaneVec;
 
 /// How many numbers a solver keeps from step to step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -112,13 +112,6 @@ impl Kept {
     pub fn by_point(&mut self) -> [&mut [f32]; 2] {
         let seconds = self.points.len() / 2;
         self.points.split_at_mut(seconds).into()
-    }
-
-    /// Bytes held.
-    pub fn held_bytes(&self) -> usize {
-        let lists = [&self.contacts, &self.points, &self.last_contacts, &self.last_points];
-        let names = held(&self.names) + held(&self.last_names);
-        names + lists.map(LaneVec::bytes).iter().sum::<usize>() + held(&self.bodies)
     }
 
     /// Assigns the numbers to the contacts of the coming step, which are sorted by shape pair. `changed`:

@@ -1,6 +1,5 @@
 //! Rigid rows of joints that are links of chains, in lanes; see `constraints/joints/chains`.
 
-use crate::engine::lanes::held;
 use bytemuck::Pod;
 use wide::f32x8;
 
@@ -64,11 +63,6 @@ impl<V: Pod> LinkGroups<V> {
     #[inline(always)]
     pub fn group_mut(&mut self, group: usize) -> &mut [V] {
         &mut self.values[group * self.stride..][..self.stride]
-    }
-
-    /// Bytes held.
-    pub fn held_bytes(&self) -> usize {
-        held(&self.values)
     }
 }
 

@@ -1,13 +1,13 @@
 //! Assignment of constraints to lanes: by colors, or one after the other.
 
 use super::Workspace;
-use crate::engine::coloring::{Coloring, EXEMPT};
-use crate::engine::constraints::records::batches::Place;
-use crate::engine::constraints::records::features::{Features, Layout, OppositeKind};
-use crate::engine::constraints::records::graph::{Graph, UNSUPPORTED};
-use crate::engine::constraints::records::order::mixed;
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{LaneWidth, held};
+use crate::coloring::{Coloring, EXEMPT};
+use crate::constraints::records::batches::Place;
+use crate::constraints::records::features::{Features, Layout, OppositeKind};
+use crate::constraints::records::graph::{Graph, UNSUPPORTED};
+use crate::constraints::records::order::mixed;
+use crate::contacts::Contact;
+use crate::lanes::LaneWidth;
 
 /// A constraint that gets a lane.
 #[derive(Clone, Copy, Debug)]
@@ -79,12 +79,6 @@ const BATCH_COST: usize = 12;
 const STAGES_PER_LEVEL: u32 = 256;
 
 impl Assignment {
-    /// Bytes held.
-    pub fn held_bytes(&self) -> usize {
-        let one = |g: &Group| held(&g.entries) + held(&g.edges) + g.coloring.held_bytes();
-        self.groups.iter().map(one).sum::<usize>() + held(&self.color)
-    }
-
     /// Discards all colors, so that the next call recomputes them even for the same contacts.
     pub fn forget(&mut self) {
         self.groups.iter_mut().for_each(|group| group.coloring.forget());

@@ -1,11 +1,11 @@
 //! Passes over bodies.
 
 use super::Passes;
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::motion::Motion;
-use crate::engine::constraints::kernels::velocity::masses::{EffectiveMasses, ScaledMasses};
-use crate::engine::constraints::records::graph::Graph;
-use crate::engine::lanes::BodyRow;
+use crate::clock::Phase;
+use crate::constraints::kernels::motion::Motion;
+use crate::constraints::kernels::velocity::masses::{EffectiveMasses, ScaledMasses};
+use crate::constraints::records::graph::Graph;
+use crate::lanes::BodyRow;
 
 impl Passes<'_> {
     /// Time for which bodies move with the velocities of [`Self::integrate_velocities`] (s): h, or 0 if they
@@ -16,10 +16,8 @@ impl Passes<'_> {
 
     /// Runs a body pass of the solver's own, on the rows and on their motion, booked on `phase`.
     pub fn over_bodies(&mut self, phase: Phase, pass: impl FnOnce(&mut Vec<BodyRow>, &mut Motion)) {
-        if self.input.phases.runs(phase) {
-            pass(&mut self.work.rows, &mut self.work.motion);
-            self.clock.lap(phase);
-        }
+        pass(&mut self.work.rows, &mut self.work.motion);
+        self.clock.lap(phase);
     }
 
     /// Body pass: v ← damped v + h a.
@@ -74,11 +72,7 @@ impl Passes<'_> {
     /// recomputes the effective masses of the constraints in the present order. Until
     /// [`Self::restore_masses`], a Jacobi sweep treats a factor n as n copies of a body.
     pub fn scale_masses(&mut self, phase: Phase, masses: &mut ScaledMasses, factor: impl Fn(usize) -> f32) {
-        if !self.input.phases.runs(phase) {
-            return;
-        }
         masses.scale(&mut self.work.rows, factor);
-        self.book_rows([32.0, 32.0]);
         self.over_batches(phase, &mut EffectiveMasses { factors: &[] });
         self.clock.lap(phase);
     }
@@ -86,8 +80,6 @@ impl Passes<'_> {
     /// Ends the scaling by [`Self::scale_masses`].
     pub fn restore_masses(&mut self, phase: Phase, masses: &mut ScaledMasses) {
         self.scale_masses(phase, masses, |_| 1.0);
-        if self.input.phases.runs(phase) {
-            masses.forget();
-        }
+        masses.forget();
     }
 }

@@ -2,10 +2,10 @@
 //! friction holds points at their places; see `kernels/velocity/sticky.rs`.
 
 use super::{Passes, StepParts, Workspace};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::sticky::{BookDrift, LoadDrift, Sticky, StickySweep};
-use crate::engine::constraints::kernels::velocity::sweep::ContactLaw;
-use crate::engine::constraints::records::point_vector::PointVector;
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::sticky::{BookDrift, LoadDrift, Sticky, StickySweep};
+use crate::constraints::kernels::velocity::sweep::ContactLaw;
+use crate::constraints::records::point_vector::PointVector;
 
 /// Drifts within a step. Between steps they are in [`super::Passes::kept`], one float per contact point.
 #[derive(Clone, Debug, Default)]
@@ -17,23 +17,20 @@ pub(crate) struct Drifts {
 impl Drifts {
     /// Brings drifts into lane order. Called once per step, before all sweeps.
     pub fn load(&mut self, passes: &mut Passes<'_>) {
-        if passes.runs(Phase::Prepare) {
-            self.vector.clear();
-            if passes.rows_per_point() == 2 {
-                let StepParts { work: Workspace { lanes, serial, .. }, .. } = passes.parts();
-                self.vector.reset([lanes, serial], 0);
-                let drifts = passes.parts_of(&mut self.vector);
-                passes.run(Phase::Prepare, &mut LoadDrift { drifts });
-            }
+        self.vector.clear();
+        if passes.rows_per_point() == 2 {
+            let StepParts { work: Workspace { lanes, serial, .. }, .. } = passes.parts();
+            self.vector.reset([lanes, serial], 0);
+            let drifts = passes.parts_of(&mut self.vector);
+            passes.run(Phase::Prepare, &mut LoadDrift { drifts });
         }
     }
 
     /// One sweep, without the rows of points that bounce.
     pub fn sweep(&mut self, passes: &mut Passes<'_>, phase: Phase, sticky: Sticky) {
         let drifts = passes.parts_of(&mut self.vector);
-        if passes.run(phase, &mut StickySweep { sticky, drifts }) {
-            passes.count_sweep(passes.rows_per_point());
-        }
+        passes.run(phase, &mut StickySweep { sticky, drifts });
+        passes.count_sweep(passes.rows_per_point());
     }
 
     /// One sweep, and one over the rows of points that bounce. `law` is the law that they solve.
@@ -48,9 +45,5 @@ impl Drifts {
             let drifts = passes.parts_of(&mut self.vector);
             passes.run(Phase::Store, &mut BookDrift { reach, drifts });
         }
-    }
-
-    pub fn held_bytes(&self) -> usize {
-        self.vector.held_bytes()
     }
 }

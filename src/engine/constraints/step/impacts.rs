@@ -1,14 +1,14 @@
 //! Impacts, and the impulses of a step.
 
 use super::{Passes, Workspace};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::impacts::restitution::Rebound;
-use crate::engine::constraints::impacts::spread::{self, Find, SpreadInput, VISITS};
-use crate::engine::constraints::impacts::{ImpactLaw, bias, restitution};
-use crate::engine::constraints::kernels::pass::PassMode;
-use crate::engine::constraints::records::batches::Part;
-use crate::engine::constraints::records::bounces::Bounces;
-use crate::engine::params::RESTITUTION_THRESHOLD;
+use crate::clock::Phase;
+use crate::constraints::impacts::restitution::Rebound;
+use crate::constraints::impacts::spread::{self, Find, SpreadInput, VISITS};
+use crate::constraints::impacts::{ImpactLaw, bias, restitution};
+use crate::constraints::kernels::pass::PassMode;
+use crate::constraints::records::batches::Part;
+use crate::constraints::records::bounces::Bounces;
+use crate::params::RESTITUTION_THRESHOLD;
 
 /// How impacts spread; see [`spread`].
 #[derive(Clone, Copy, Debug)]
@@ -107,7 +107,7 @@ impl Passes<'_> {
     /// Finds the points that bounce during the whole step. For solvers whose impulses add up over its
     /// substeps: a rebound must last until the end. They call [`Self::bounce`] for the last substep alone.
     pub(crate) fn find_bounces_of_step(&mut self) {
-        if self.law() == ImpactLaw::Bias && self.input.phases.runs(Phase::Prepare) {
+        if self.law() == ImpactLaw::Bias {
             self.begin_bias(false, self.dt());
         }
     }
@@ -122,7 +122,7 @@ impl Passes<'_> {
 
     /// Solves the rows of points that bounce, after a sweep over the others.
     pub(super) fn sweep_bias(&mut self, phase: Phase) {
-        if self.biased && self.input.phases.runs(phase) {
+        if self.biased {
             self.over_contacts(&mut bias::BiasSweep);
             self.clock.lap(phase);
         }
@@ -137,11 +137,11 @@ impl Passes<'_> {
     /// The first part of [`Self::end_substep`].
     pub fn bounce(&mut self, substep: u32) {
         let is_last = substep + 1 == self.input.budget.substeps;
-        if self.law() == ImpactLaw::Bias && !is_last && self.input.phases.runs(Phase::Restitution) {
+        if self.law() == ImpactLaw::Bias && !is_last {
             self.begin_bias(false, self.input.h);
             self.clock.lap(Phase::Restitution);
         }
-        if self.bounces && self.input.phases.runs(Phase::Restitution) {
+        if self.bounces {
             self.over_contacts(&mut restitution::Track);
             if is_last {
                 self.over_contacts(&mut restitution::Apply);
@@ -153,7 +153,7 @@ impl Passes<'_> {
 
     /// The second part of [`Self::end_substep`]: adds the accumulated impulses to those of the step.
     pub fn book_impulses(&mut self) {
-        if self.input.record_impulses && self.input.phases.runs(Phase::Store) {
+        if self.input.record_impulses {
             self.over_types_alone(Phase::Store, PassMode::Book);
             let Workspace { lanes, serial, .. } = &mut *self.work;
             for batches in [lanes, serial] {

@@ -18,21 +18,19 @@ pub(crate) use impacts::Spreading;
 pub use solver::{Collision, CollisionScene, Schedule, Solver};
 pub use workspace::{IterationObserver, StepInput, Watch, WorkCount, Workspace};
 
-use crate::engine::clock::{Clock, Phase};
-use crate::engine::constraints::impacts::ImpactLaw;
-use crate::engine::constraints::kernels::pass::{AnyPass, PassInput, PassMode, PassWidth, PerLane};
-use crate::engine::constraints::kernels::prepare::{Prepare, Store};
-use crate::engine::constraints::kernels::types::{ConstraintType, Joined, TypeInput, TypeRows};
-use crate::engine::constraints::kernels::velocity::rules::Softness;
-use crate::engine::constraints::records::batches::{Batches, Part};
-use crate::engine::constraints::records::features::Layout;
-use crate::engine::constraints::records::kept::Kept;
-use crate::engine::constraints::records::order::SweepOrder;
-use crate::engine::constraints::vectors::system::Others;
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, LaneWidth};
-use crate::engine::narrowphase::Margins;
-use crate::engine::params::{Budget, MAX_POSITION_CORRECTION, MAX_PUSH_SPEED};
+use crate::clock::{Clock, Phase};
+use crate::constraints::kernels::pass::{AnyPass, PassInput, PassMode};
+use crate::constraints::kernels::prepare::{Prepare, Store};
+use crate::constraints::kernels::types::{Joined, TypeInput, TypeRows};
+use crate::constraints::kernels::velocity::rules::Softness;
+use crate::constraints::records::batches::{Batches, Part};
+use crate::constraints::records::kept::Kept;
+use crate::constraints::records::order::SweepOrder;
+use crate::constraints::vectors::system::Others;
+use crate::contacts::Contact;
+use crate::lanes::LaneWidth;
+use crate::narrowphase::Margins;
+use crate::params::{Budget, MAX_POSITION_CORRECTION, MAX_PUSH_SPEED};
 
 /// One step's problem, prepared.
 ///
@@ -64,7 +62,7 @@ pub struct StepParts<'p> {
     pub contacts: &'p mut [Contact],
     /// Inputs of the step.
     pub input: &'p StepInput,
-    /// Books the time of passes, and the bytes that they read and write.
+    /// Books the time of passes.
     pub clock: &'p mut Clock,
     /// Lanes of the colored batches.
     pub width: LaneWidth,
@@ -83,9 +81,6 @@ impl<'a> Passes<'a> {
         width: LaneWidth,
     ) -> Self {
         let (count, order) = (WorkCount::default(), SweepOrder::Forward);
-        // A phase that is repeated alone uses the side records of the step before.
-        let are_prepared = work.impacts.bounces[0].are_prepared();
-        let (bounces, biased) = (are_prepared, are_prepared);
         let mut passes = Passes {
             work,
             contacts,
@@ -95,22 +90,17 @@ impl<'a> Passes<'a> {
             count,
             iterations: 0,
             order,
-            bounces,
-            biased,
+            bounces: false,
+            biased: false,
             driven: false,
         };
-        passes.bounces &= passes.law() != ImpactLaw::Bias;
-        passes.biased &= passes.law() == ImpactLaw::Bias;
         passes.set_order(SweepOrder::Forward);
-        // A phase that is repeated alone uses the records of the step before, which have been checked.
-        if passes.input.phases.runs(Phase::Prepare) {
-            for (batches, width) in [(&passes.work.lanes, width.lanes()), (&passes.work.serial, 1)] {
-                batches.assert_fits(width, passes.work.rows.len(), passes.contacts.len());
-            }
-            passes.over_batches(Phase::Prepare, &mut Prepare);
-            passes.begin_impacts();
-            passes.clock.lap(Phase::Prepare);
+        for (batches, width) in [(&passes.work.lanes, width.lanes()), (&passes.work.serial, 1)] {
+            batches.assert_fits(width, passes.work.rows.len(), passes.contacts.len());
         }
+        passes.over_batches(Phase::Prepare, &mut Prepare);
+        passes.begin_impacts();
+        passes.clock.lap(Phase::Prepare);
         passes
     }
 
@@ -129,7 +119,7 @@ impl<'a> Passes<'a> {
         self.input.h * self.input.budget.substeps as f32
     }
 
-    /// Size of typical bodies (m), [`Settings::length_unit`](crate::engine::world::Settings::length_unit).
+    /// Size of typical bodies (m), [`Settings::length_unit`](crate::world::Settings::length_unit).
     pub fn length_unit(&self) -> f32 {
         self.input.length_unit
     }
@@ -180,19 +170,11 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// Whether `phase` runs: always in a full step; otherwise only the phase that is repeated alone.
-    pub fn runs(&self, phase: Phase) -> bool {
-        self.input.phases.runs(phase)
-    }
-
-    /// Runs a constraint pass of the solver's own, booked on `phase`. Returns false if it did not run because
-    /// another phase is repeated alone. Passes that solve rows are counted by [`Self::count_sweep`].
-    pub fn run(&mut self, phase: Phase, pass: &mut dyn AnyPass) -> bool {
-        if !self.input.phases.runs(phase) {
-            return false;
-        }
+    /// Runs a constraint pass of the solver's own, booked on `phase`. Passes that solve rows are counted by
+    /// [`Self::count_sweep`].
+    pub fn run(&mut self, phase: Phase, pass: &mut dyn AnyPass) {
         if is_sweep(phase) && self.has_no_sweeps() {
-            return true;
+            return;
         }
         if matches!(phase, Phase::Prepare | Phase::Store) {
             // Constraints of other types have their records already.
@@ -201,7 +183,6 @@ impl<'a> Passes<'a> {
             self.over_batches(phase, pass);
         }
         self.clock.lap(phase);
-        true
     }
 
     /// Sets the order of the passes that follow, until the next call or the end of the step.
@@ -248,10 +229,8 @@ impl<'a> Passes<'a> {
     /// Writes accumulated impulses back to the contacts, and returns the work done.
     pub fn finish(mut self) -> WorkCount {
         self.set_order(SweepOrder::Forward);
-        if self.input.phases.runs(Phase::Store) {
-            self.over_batches(Phase::Store, &mut Store);
-            self.clock.lap(Phase::Store);
-        }
+        self.over_batches(Phase::Store, &mut Store);
+        self.clock.lap(Phase::Store);
         let Workspace { types, poses, .. } = &mut *self.work;
         types.iter_mut().for_each(|joined| joined.kind.link(&[], poses));
         self.count
@@ -306,9 +285,6 @@ impl<'a> Passes<'a> {
             let batches = part.of(lanes, serial);
             if batches.next_rank() == Some(rank) {
                 batches.focus_on(rank);
-                if self.input.phases.counted && is_sweep(phase) && !kind.is_idle() {
-                    self.clock.book_bytes(type_traffic(&**kind, batches));
-                }
                 let rows = TypeRows::new(rows, pass.sums_of(), mode);
                 kind.run(TypeInput {
                     phase,
@@ -329,8 +305,7 @@ impl<'a> Passes<'a> {
     /// Runs over the constraints of other types, without the contacts.
     pub(super) fn over_types_alone(&mut self, phase: Phase, mode: PassMode) {
         let Workspace { rows, types, poses, .. } = &mut *self.work;
-        let (h, counted, driven) = (self.input.h, self.input.phases.counted, self.driven);
-        let mut others = Others { types, poses, h, counted, driven };
+        let mut others = Others { types, poses, h: self.input.h, driven: self.driven };
         others.run(rows, self.width, (phase, mode), Softness::RIGID, [&mut [], &mut []]);
     }
 
@@ -338,15 +313,6 @@ impl<'a> Passes<'a> {
         let width = self.width_of(part);
         let Workspace { rows, motion, lanes, serial, impacts, kept, .. } = &mut *self.work;
         let batches = part.of(lanes, serial);
-        if self.input.phases.counted {
-            for segment in batches.visits() {
-                let layout = Layout::for_features(&self.input.features, segment.opposite);
-                let PerLane { floats_read, floats_written, rows, halves } =
-                    pass.traffic_of(&layout, segment.opposite);
-                let each = [floats_read, floats_written, rows, halves];
-                self.clock.book(segment.opposite as usize, segment.contacts, each);
-            }
-        }
         let on = PassInput {
             rows,
             batches,
@@ -366,10 +332,10 @@ impl<'a> Passes<'a> {
         }
     }
 
-    fn width_of(&self, part: Part) -> PassWidth {
+    fn width_of(&self, part: Part) -> LaneWidth {
         match part {
-            Part::Lanes => PassWidth { width: self.width, counted: self.input.phases.counted },
-            Part::Serial => PassWidth { width: LaneWidth::W1, counted: false },
+            Part::Lanes => self.width,
+            Part::Serial => LaneWidth::W1,
         }
     }
 
@@ -379,31 +345,9 @@ impl<'a> Passes<'a> {
         let types = types.iter_mut().map(move |t| part.of(&mut t.lanes, &mut t.serial));
         types.chain([part.of(lanes, serial)])
     }
-
-    /// Books the bytes read and written per body row.
-    pub fn book_rows(&mut self, bytes: [f64; 2]) {
-        let rows = self.work.rows.len() as f64;
-        self.clock.book_bytes(bytes.map(|b| rows * b));
-    }
 }
-
-/// Bytes of a body's row.
-const ROW: f64 = size_of::<BodyRow>() as f64;
 
 /// Whether the phase solves or applies impulses.
 fn is_sweep(phase: Phase) -> bool {
     matches!(phase, Phase::WarmStart | Phase::Solve | Phase::Relax | Phase::Position)
-}
-
-/// Bytes that a sweep over the constraints of a type reads and writes: records and impulses, three indices,
-/// both bodies.
-fn type_traffic(kind: &dyn ConstraintType, batches: &Batches) -> [f64; 2] {
-    let mut sums = [0.0; 2];
-    for segment in batches.visits() {
-        let lanes = (segment.batches * batches.width()) as f64;
-        let pushed = if segment.pushes_a() { 2.0 } else { 1.0 };
-        sums[0] += lanes * (4.0 * (kind.stride() + 3) as f64 + 2.0 * ROW);
-        sums[1] += lanes * (4.0 * kind.rows() as f64 + 0.5 * ROW * pushed);
-    }
-    sums
 }

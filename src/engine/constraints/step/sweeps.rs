@@ -1,25 +1,22 @@
 //! Passes over constraints: warm starts, velocity sweeps and position sweeps.
 
-use super::{Passes, ROW, Workspace};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::joints::chains::{ChainStage, Chains};
-use crate::engine::constraints::kernels::observe::ObservedRule;
-use crate::engine::constraints::kernels::pass::{AnyPass, PassMode};
-use crate::engine::constraints::kernels::position::PositionSweep;
-use crate::engine::constraints::kernels::velocity::block::BlockSweep;
-use crate::engine::constraints::kernels::velocity::jacobi::{self, JacobiSweep};
-use crate::engine::constraints::kernels::velocity::masses::{EffectiveMasses, ScaledMasses};
-use crate::engine::constraints::kernels::velocity::rules::{NormalRule, Rule, Soft};
-use crate::engine::constraints::kernels::velocity::sweep::{ContactLaw, Sweep, VelocitySweep};
-use crate::engine::constraints::kernels::velocity::warm_start::WarmStart;
-use crate::engine::lanes::BodyRow;
+use super::{Passes, Workspace};
+use crate::clock::Phase;
+use crate::constraints::joints::chains::{ChainStage, Chains};
+use crate::constraints::kernels::observe::ObservedRule;
+use crate::constraints::kernels::pass::{AnyPass, PassMode};
+use crate::constraints::kernels::position::PositionSweep;
+use crate::constraints::kernels::velocity::block::BlockSweep;
+use crate::constraints::kernels::velocity::jacobi::{self, JacobiSweep};
+use crate::constraints::kernels::velocity::masses::{EffectiveMasses, ScaledMasses};
+use crate::constraints::kernels::velocity::rules::{NormalRule, Rule, Soft};
+use crate::constraints::kernels::velocity::sweep::{ContactLaw, Sweep, VelocitySweep};
+use crate::constraints::kernels::velocity::warm_start::WarmStart;
+use crate::lanes::BodyRow;
 
 impl Passes<'_> {
     /// Sets all accumulated impulses to zero, for solvers without warm starting.
     pub fn forget_impulses(&mut self) {
-        if !self.input.phases.runs(Phase::Prepare) {
-            return;
-        }
         let mut zero = self.vector();
         self.system().set_lane_impulses(&mut zero);
         self.give_back([zero]);
@@ -31,7 +28,7 @@ impl Passes<'_> {
     /// that move bodies before they solve: the law of a spring is for velocities that have not moved bodies
     /// yet.
     pub fn drive_joints(&mut self) {
-        if !self.work.types.is_empty() && self.input.phases.runs(Phase::Solve) {
+        if !self.work.types.is_empty() {
             self.over_types_alone(Phase::Prepare, PassMode::Forget);
             self.over_types_alone(Phase::Solve, PassMode::Drive);
             self.driven = true;
@@ -42,7 +39,7 @@ impl Passes<'_> {
     /// Pass over joints alone: books their impulses and resets them to zero. For solvers whose contacts sum
     /// up their impulses over a step of several substeps.
     pub fn restart_joints(&mut self) {
-        if !self.work.types.is_empty() && self.input.phases.runs(Phase::Solve) {
+        if !self.work.types.is_empty() {
             if self.input.record_impulses {
                 self.over_types_alone(Phase::Store, PassMode::Book);
             }
@@ -60,7 +57,7 @@ impl Passes<'_> {
         let Workspace { rows, types, poses, .. } = &mut *self.work;
         chains.find(types, rows);
         chains.set_aside(types, poses);
-        if !chains.is_empty() && !self.contacts.is_empty() && self.input.phases.runs(Phase::Prepare) {
+        if !chains.is_empty() && !self.contacts.is_empty() {
             let pairs = self.contacts.iter().map(|contact| [contact.body_a, contact.body_b]);
             let shared = chains.share_masses(types, rows, self.input.length_unit, pairs);
             if let Some((masses, factors)) = shared {
@@ -79,9 +76,7 @@ impl Passes<'_> {
     /// Body pass: notes the velocities of chains. Called before warm starts, which change them by the masses
     /// for contacts.
     pub fn note_chains(&mut self, chains: &mut Chains) {
-        if self.input.phases.runs(Phase::WarmStart) {
-            chains.note(&self.work.rows);
-        }
+        chains.note(&self.work.rows);
     }
 
     /// Pass over joints alone: solves the rigid rows of each chain of joints at once.
@@ -89,12 +84,9 @@ impl Passes<'_> {
         let phase = if stage == ChainStage::Relax { Phase::Relax } else { Phase::Solve };
         // No sweep has moved the bodies since.
         let is_done = stage != ChainStage::Begin && self.has_no_sweeps();
-        if self.has_chains(chains) && self.input.phases.runs(phase) && !is_done {
+        if self.has_chains(chains) && !is_done {
             let Workspace { rows, types, .. } = &mut *self.work;
-            let solved = chains.solve(types, rows, [self.input.h, self.input.length_unit], stage);
-            if solved && self.input.phases.counted {
-                self.clock.book_bytes(chains.traffic());
-            }
+            chains.solve(types, rows, [self.input.h, self.input.length_unit], stage);
             self.clock.lap(phase);
         }
     }
@@ -102,10 +94,7 @@ impl Passes<'_> {
     /// Pass over joints alone: joints of chains take over the impulses of the last substep, or of every
     /// substep if impulses are recorded.
     pub fn keep_chains(&mut self, chains: &Chains, is_last: bool) {
-        if (is_last || self.input.record_impulses)
-            && self.has_chains(chains)
-            && self.input.phases.runs(Phase::Relax)
-        {
+        if (is_last || self.input.record_impulses) && self.has_chains(chains) {
             chains.give_impulses(&mut self.work.types);
             if self.input.record_impulses {
                 // Types defined by the caller treat this pass as a normal store.
@@ -121,9 +110,9 @@ impl Passes<'_> {
 
     /// Pass over joints alone: their records take up the changes by [`ConstraintType::replace`].
     ///
-    /// [`ConstraintType::replace`]: crate::engine::constraints::kernels::types::ConstraintType::replace
+    /// [`ConstraintType::replace`]: crate::constraints::kernels::types::ConstraintType::replace
     pub fn reload_types(&mut self) {
-        if !self.work.types.is_empty() && self.input.phases.runs(Phase::Solve) {
+        if !self.work.types.is_empty() {
             self.over_types_alone(Phase::Prepare, PassMode::InTurn);
             self.clock.lap(Phase::Solve);
         }
@@ -146,14 +135,13 @@ impl Passes<'_> {
 
     /// As [`Self::sweep`], with the solver's own rule.
     pub fn velocity_sweep(&mut self, phase: Phase, sweep: &mut dyn VelocitySweep) {
-        if self.run(phase, sweep) {
-            self.sweep_bias(phase);
-            self.solved(sweep);
-        }
+        self.run(phase, sweep);
+        self.sweep_bias(phase);
+        self.solved(sweep);
     }
 
     /// Constraint pass: as [`Self::sweep`], but the two normal rows of a contact are solved
-    /// together; see [`crate::engine::constraints::kernels::velocity::block`].
+    /// together; see [`crate::constraints::kernels::velocity::block`].
     pub fn block_sweep<R: NormalRule>(&mut self, phase: Phase, rule: R) {
         self.sweep_by(phase, &mut BlockSweep::<_, false>(rule), &Sweep(rule));
     }
@@ -165,15 +153,14 @@ impl Passes<'_> {
 
     /// Constraint pass: one velocity sweep with the solver's own pass. `law` is the law that it solves.
     pub fn sweep_by(&mut self, phase: Phase, pass: &mut dyn AnyPass, law: &dyn ContactLaw) {
-        if self.run(phase, pass) {
-            self.sweep_bias(phase);
-            self.solved(law);
-        }
+        self.run(phase, pass);
+        self.sweep_bias(phase);
+        self.solved(law);
     }
 
     /// Constraint pass: every contact reads the velocities from before the pass. The changes of each body,
     /// times `relaxation`, are summed up in `sums`; see
-    /// [`crate::engine::constraints::kernels::velocity::jacobi`]. `split`: bodies that are split into copies.
+    /// [`crate::constraints::kernels::velocity::jacobi`]. `split`: bodies that are split into copies.
     pub fn jacobi_sweep(
         &mut self,
         phase: Phase,
@@ -182,13 +169,8 @@ impl Passes<'_> {
         sums: &mut Vec<BodyRow>,
         split: Option<&ScaledMasses>,
     ) {
-        if !self.input.phases.runs(phase) {
-            return;
-        }
         jacobi::begin(&self.work.rows, sums);
         self.over_batches(phase, &mut JacobiSweep { rule, relaxation, sums });
-        // Sums are cleared, read, and added to velocities.
-        self.book_rows([ROW, 1.5 * ROW]);
         jacobi::finish(&mut self.work.rows, sums, split.map_or(&[], ScaledMasses::whole));
         self.clock.lap(phase);
         self.solved(&Sweep(rule));
@@ -199,17 +181,15 @@ impl Passes<'_> {
     pub fn push_sweep(&mut self, phase: Phase, rule: &Rule) {
         let mut rule = *rule;
         let sweep = rule.sweep();
-        if self.run(phase, sweep) {
-            let rows = if sweep.has_friction() { self.rows_per_point() } else { 1 };
-            self.count_sweep(rows);
-        }
+        self.run(phase, sweep);
+        let rows = if sweep.has_friction() { self.rows_per_point() } else { 1 };
+        self.count_sweep(rows);
     }
 
     /// Constraint pass: one position sweep, nonlinear Gauss–Seidel.
     pub fn position_sweep(&mut self, mut sweep: PositionSweep) {
-        if self.run(Phase::Position, &mut sweep) {
-            self.count_sweep(1);
-        }
+        self.run(Phase::Position, &mut sweep);
+        self.count_sweep(1);
     }
 
     /// Sets the observed law, for solvers that solve it without a sweep.

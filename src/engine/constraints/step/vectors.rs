@@ -1,27 +1,18 @@
 //! The problem of a step as vectors.
 
 use super::{Passes, Workspace};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::types::Joined;
-use crate::engine::constraints::records::point_vector::PointVector;
-use crate::engine::constraints::vectors::system::{Others, System};
-use crate::engine::lanes::Block;
+use crate::clock::Phase;
+use crate::constraints::kernels::types::Joined;
+use crate::constraints::records::point_vector::PointVector;
+use crate::constraints::vectors::system::{Others, System};
+use crate::lanes::Block;
 
 impl Passes<'_> {
     /// All impulses and velocities as vectors, in an order that does not depend on the width.
     pub fn system(&mut self) -> System<'_> {
         let Workspace { rows, lanes, serial, types, poses, .. } = &mut *self.work;
-        let (h, counted) = (self.input.h, self.input.phases.counted);
-        let joints = Others { types, poses, h, counted, driven: self.driven };
-        System::new(
-            rows,
-            [lanes, serial],
-            self.contacts,
-            joints,
-            &self.input.features,
-            self.clock,
-            self.width,
-        )
+        let joints = Others { types, poses, h: self.input.h, driven: self.driven };
+        System::new(rows, [lanes, serial], self.contacts, joints, &self.input.features, self.width)
     }
 
     /// Largest violation of the rigid contact law at present (N·s); see [`System::residual`].
@@ -49,7 +40,7 @@ impl Passes<'_> {
     }
 
     /// Effective masses of all rows (kg, kg·m²), for
-    /// [`energy`](crate::engine::constraints::records::point_vector::energy). `None` in a scene without joints,
+    /// [`energy`](crate::constraints::records::point_vector::energy). `None` in a scene without joints,
     /// whose rows have one unit.
     pub fn energy_masses(&mut self, phase: Phase) -> Option<PointVector> {
         let mut masses = self.system().has_joints().then(|| self.vector())?;
@@ -66,11 +57,8 @@ impl Passes<'_> {
         self.work.vectors.extend(vectors.into_iter().rev());
     }
 
-    /// Runs `work` on vectors, booked on `phase`. Skipped while another phase is repeated alone.
-    pub fn with_system<T: Default>(&mut self, phase: Phase, work: impl FnOnce(&mut System<'_>) -> T) -> T {
-        if !self.input.phases.runs(phase) {
-            return T::default();
-        }
+    /// Runs `work` on vectors, booked on `phase`.
+    pub fn with_system<T>(&mut self, phase: Phase, work: impl FnOnce(&mut System<'_>) -> T) -> T {
         let result = work(&mut self.system());
         self.clock.lap(phase);
         result

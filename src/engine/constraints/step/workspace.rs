@@ -1,18 +1,17 @@
 //! Working data, inputs and counts of a step.
 
-use crate::engine::clock::PhaseFilter;
-use crate::engine::constraints::impacts::{ImpactLaw, ImpactRecords};
-use crate::engine::constraints::kernels::motion::Motion;
-use crate::engine::constraints::kernels::observe::ObservedRule;
-use crate::engine::constraints::kernels::types::Joined;
-use crate::engine::constraints::records::batches::Batches;
-use crate::engine::constraints::records::features::Features;
-use crate::engine::constraints::records::kept::Kept;
-use crate::engine::constraints::records::point_vector::PointVector;
-use crate::engine::constraints::vectors::system::System;
-use crate::engine::lanes::BodyRow;
-use crate::engine::narrowphase::lanes::PoseRow;
-use crate::engine::params::{Budget, Parameters, Without};
+use crate::constraints::impacts::{ImpactLaw, ImpactRecords};
+use crate::constraints::kernels::motion::Motion;
+use crate::constraints::kernels::observe::ObservedRule;
+use crate::constraints::kernels::types::Joined;
+use crate::constraints::records::batches::Batches;
+use crate::constraints::records::features::Features;
+use crate::constraints::records::kept::Kept;
+use crate::constraints::records::point_vector::PointVector;
+use crate::constraints::vectors::system::System;
+use crate::lanes::BodyRow;
+use crate::narrowphase::lanes::PoseRow;
+use crate::params::{Budget, Parameters, Without};
 use std::fmt;
 
 /// Working data of a step. Kept from step to step, so that nothing is allocated.
@@ -76,13 +75,6 @@ impl Clone for Workspace {
     }
 }
 
-impl Workspace {
-    /// Bytes held for data that only some solvers use.
-    pub fn own_bytes(&self) -> usize {
-        self.kept.held_bytes() + self.vectors.iter().map(PointVector::held_bytes).sum::<usize>()
-    }
-}
-
 /// Work counts of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WorkCount {
@@ -114,9 +106,7 @@ pub struct StepInput {
     pub parameters: Parameters,
     /// Mechanisms of the solver that are left out.
     pub without: Without,
-    /// Which phases run.
-    pub phases: PhaseFilter,
-    /// Whether to sum impulses into [`crate::engine::contacts::Contact::step_impulse`].
+    /// Whether to sum impulses into [`crate::contacts::Contact::step_impulse`].
     pub record_impulses: bool,
     /// Impact law of the run.
     pub impacts: ImpactLaw,

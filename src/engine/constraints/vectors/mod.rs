@@ -3,7 +3,6 @@
 pub mod blocks;
 pub mod body_matrix;
 pub mod conjugate;
-pub mod levels;
 pub(crate) mod passes;
 pub mod spectral;
 pub mod system;

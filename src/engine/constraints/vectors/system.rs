@@ -7,17 +7,18 @@
 //! either have the same bits at every width. An entry of λ or of a relative velocity is
 //! `[normal, tangential]`, along n and t = (n_y, −n_x) on body b.
 
-use crate::engine::clock::{Clock, Phase};
-use crate::engine::constraints::kernels::pass::{PassMode, PassWidth, VectorTask, at_width};
-use crate::engine::constraints::kernels::types::{Joined, TypeInput, TypeRows};
-use crate::engine::constraints::kernels::velocity::rules::Softness;
-use crate::engine::constraints::records::batches::{Batches, Part};
-use crate::engine::constraints::records::features::{Features, Layout};
-use crate::engine::constraints::records::point_vector::PointVector;
-use crate::engine::constraints::vectors::passes::{self, VectorInput};
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{Block, BodyRow, LaneWidth};
-use crate::engine::narrowphase::lanes::PoseRow;
+use crate::clock::Phase;
+use crate::constraints::kernels::pass::{PassMode, VectorTask, at_width};
+use crate::constraints::kernels::types::{Joined, TypeInput, TypeRows};
+use crate::constraints::kernels::velocity::rules::Softness;
+use crate::constraints::numerics::cone;
+use crate::constraints::records::batches::{Batches, Part};
+use crate::constraints::records::features::{Features, Layout};
+use crate::constraints::records::point_vector::PointVector;
+use crate::constraints::vectors::passes::{self, VectorInput};
+use crate::contacts::Contact;
+use crate::lanes::{Block, BodyRow, LaneWidth};
+use crate::narrowphase::lanes::PoseRow;
 
 /// `[normal, tangential]` of one contact point.
 pub type Pair = [f32; 2];
@@ -29,7 +30,6 @@ pub struct System<'a> {
     contacts: &'a [Contact],
     pub(super) others: Others<'a>,
     features: &'a Features,
-    clock: &'a mut Clock,
     width: LaneWidth,
 }
 
@@ -39,7 +39,6 @@ pub(crate) struct Others<'a> {
     pub poses: &'a [PoseRow],
     /// Length of the substep (s).
     pub h: f32,
-    pub counted: bool,
     /// Whether springs and motors have already acted in this substep.
     pub driven: bool,
 }
@@ -54,12 +53,12 @@ impl Others<'_> {
         law: Softness,
         [mut x, mut y]: [&mut [Block]; 2],
     ) {
-        let &mut Others { ref mut types, poses, h, counted, driven } = self;
+        let &mut Others { ref mut types, poses, h, driven } = self;
         for Joined { kind, lanes, serial } in types.iter_mut() {
             for part in [Part::Lanes, Part::Serial] {
                 let width = match part {
-                    Part::Lanes => PassWidth { width, counted },
-                    Part::Serial => PassWidth { width: LaneWidth::W1, counted: false },
+                    Part::Lanes => width,
+                    Part::Serial => LaneWidth::W1,
                 };
                 let batches = part.of(lanes, serial);
                 let count = 2 * kind.rows() * batches.groups();
@@ -81,23 +80,20 @@ impl<'a> System<'a> {
         contacts: &'a [Contact],
         others: Others<'a>,
         features: &'a Features,
-        clock: &'a mut Clock,
         width: LaneWidth,
     ) -> Self {
-        System { rows, batches, contacts, others, features, clock, width }
+        System { rows, batches, contacts, others, features, width }
     }
 
     /// Reads all accumulated impulses (N·s), in lanes.
     pub fn lane_impulses(&mut self, to: &mut PointVector) {
         let of = |layout: &Layout| [layout.normal_impulse, layout.tangent_impulse];
-        self.book_points([8.0, 8.0]);
         self.over_lanes(to, |width, on| at_width!(width, passes::read(on, of)));
         self.over_others(VectorTask::Impulses, Softness::RIGID, to, None);
     }
 
     /// Replaces all accumulated impulses (N·s), in lanes. Velocities do not change.
     pub fn set_lane_impulses(&mut self, from: &mut PointVector) {
-        self.book_points([8.0, 8.0]);
         self.over_lanes(from, |width, on| at_width!(width, passes::write_impulses(on)));
         self.over_others(VectorTask::SetImpulses, Softness::RIGID, from, None);
     }
@@ -106,7 +102,6 @@ impl<'a> System<'a> {
     /// Without friction, only those of normal rows. For rows of joints, 1/(J M⁻¹ Jᵀ + R).
     pub fn lane_masses(&mut self, to: &mut PointVector) {
         let of = |layout: &Layout| [layout.normal_mass, layout.tangent_mass];
-        self.book_points([8.0, 8.0]);
         self.over_lanes(to, |width, on| at_width!(width, passes::read(on, of)));
         self.over_others(VectorTask::Masses, Softness::RIGID, to, None);
     }
@@ -114,7 +109,6 @@ impl<'a> System<'a> {
     /// Separation at the start of the step (m) and Coulomb coefficient of each point, in lanes. A
     /// coefficient of −1 marks entries that are not contacts.
     pub fn lane_surfaces(&mut self, to: &mut PointVector) {
-        self.book_points([8.0, 8.0]);
         self.over_lanes(to, |width, on| at_width!(width, passes::read_surfaces(on)));
         let [lanes, serial] = &self.batches;
         for pair in to.others([lanes, serial]).chunks_exact_mut(2) {
@@ -124,14 +118,12 @@ impl<'a> System<'a> {
 
     /// J v: separating and sliding speed of the surfaces at each point (m/s), in lanes.
     pub fn lane_velocities(&mut self, to: &mut PointVector) {
-        self.book_points([GEOMETRY, 8.0]);
         self.over_lanes(to, |width, on| at_width!(width, passes::read_velocities(on)));
         self.over_others(VectorTask::Velocities, Softness::RIGID, to, None);
     }
 
     /// v ← v + M⁻¹ Jᵀ Δλ, in the order of the lanes. Accumulated impulses do not change.
     pub fn push_lanes(&mut self, delta: &mut PointVector) {
-        self.book_points([8.0 + GEOMETRY, 32.0]);
         self.over_lanes(delta, |width, on| at_width!(width, passes::push(on)));
         self.over_others(VectorTask::Push, Softness::RIGID, delta, None);
     }
@@ -218,7 +210,6 @@ impl<'a> System<'a> {
     pub fn impulses(&mut self, to: &mut Vec<Pair>) {
         to.clear();
         to.resize(self.len(), [0.0; 2]);
-        self.book_points([8.0, 8.0]);
         each_record(&mut self.batches, self.features, |at, normal, tangent| {
             to[at] = [*normal, tangent.map_or(0.0, |t| *t)];
         });
@@ -230,7 +221,6 @@ impl<'a> System<'a> {
     /// If `from` is not [`Self::len`] long.
     pub fn set_impulses(&mut self, from: &[Pair]) {
         assert_eq!(from.len(), self.len(), "a vector over contact points has two entries a contact");
-        self.book_points([8.0, 8.0]);
         each_record(&mut self.batches, self.features, |at, normal, tangent| {
             *normal = from[at][0];
             if let Some(tangent) = tangent {
@@ -243,7 +233,6 @@ impl<'a> System<'a> {
     pub fn relative_velocities(&mut self, to: &mut Vec<Pair>) {
         to.clear();
         to.resize(self.len(), [0.0; 2]);
-        self.book_points([GEOMETRY, 8.0]);
         let view = self.view();
         for (at, bodies, axes, arms) in view.points() {
             to[at] = view.velocity(bodies, axes, arms);
@@ -256,7 +245,6 @@ impl<'a> System<'a> {
     /// If `delta` is not [`Self::len`] long.
     pub fn apply(&mut self, delta: &[Pair]) {
         assert_eq!(delta.len(), self.len(), "a vector over contact points has two entries a contact");
-        self.book_points([8.0 + GEOMETRY, 32.0]);
         for contact in 0..self.contacts.len() {
             for p in 0..self.contacts[contact].manifold.count as usize {
                 let (at, [a, b], [n, t], [arms_n, arms_t]) = self.view().point(contact, p);
@@ -283,7 +271,6 @@ impl<'a> System<'a> {
     /// with the effective masses m and the separation s (m) at the start of the step. Zero exactly if a
     /// rigid sweep would change nothing.
     pub fn residual(&mut self, h: f32) -> f64 {
-        self.book_points([128.0, 0.0]);
         let view = Points { rows: self.rows, contacts: self.contacts, features: self.features };
         let mut worst = 0.0_f64;
         each_record(&mut self.batches, self.features, |at, normal, tangent| {
@@ -298,7 +285,7 @@ impl<'a> System<'a> {
             let mass = arms.map(|arms| view.effective_mass(bodies, arms));
             let wanted = (normal - mass[0] * (vn + f64::from(gap))).max(0.0);
             let bound = f64::from(contact.friction) * normal.max(0.0);
-            let held = (tangent - mass[1] * vt).max(-bound).min(bound);
+            let held = cone::friction_f64(tangent - mass[1] * vt, bound);
             let friction = if self.features.friction { (tangent - held).abs() } else { 0.0 };
             worst = worst.max((normal - wanted).abs()).max(friction);
         });
@@ -332,17 +319,6 @@ impl<'a> System<'a> {
     fn view(&self) -> Points<'_> {
         Points { rows: self.rows, contacts: self.contacts, features: self.features }
     }
-
-    /// Records the number of bytes read and written.
-    pub fn book(&mut self, bytes: [f64; 2]) {
-        self.clock.book_bytes(bytes);
-    }
-
-    /// Records the number of bytes read and written, given per contact point.
-    fn book_points(&mut self, bytes: [f64; 2]) {
-        let points = self.len() as f64;
-        self.clock.book_bytes(bytes.map(|b| points * b));
-    }
 }
 
 /// The normal and the tangential row of one contact point.
@@ -367,9 +343,6 @@ impl PointRows {
         [x, y, self.arms[axis][side]].map(|j| sign * f64::from(j))
     }
 }
-
-/// Bytes of the geometry of a point and of its two bodies.
-const GEOMETRY: f64 = 32.0 + 2.0 * 32.0;
 
 /// Quantities that do not depend on impulses.
 #[derive(Clone, Copy)]

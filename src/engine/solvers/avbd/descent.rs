@@ -30,10 +30,11 @@
 use super::input::{DescentInput, PENALTY};
 use super::joints::JointDescent;
 use super::lanes::{BodyLanes, Ends};
-use crate::engine::constraints::kernels::pass::at_width;
-use crate::engine::constraints::records::graph::Graph;
-use crate::engine::contacts::{Contact, quad};
-use crate::engine::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, Quad, held};
+use crate::constraints::kernels::pass::at_width;
+use crate::constraints::numerics::cone;
+use crate::constraints::records::graph::Graph;
+use crate::contacts::{Contact, quad};
+use crate::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, Quad};
 
 /// Overlap that does not count as an error (m): `COLLISION_MARGIN` of the source.
 const MARGIN: f32 = 5e-4;
@@ -73,12 +74,6 @@ pub struct Descent {
 }
 
 impl Descent {
-    /// Bytes held.
-    pub fn held_bytes(&self) -> usize {
-        let records = [&self.bodies, &self.ends, &self.contacts];
-        self.lanes.held_bytes() + self.joints.held_bytes() + records.into_iter().map(held).sum::<usize>()
-    }
-
     /// Assigns bodies to lanes: by colors, or one by one in the `sequence` of contacts.
     pub(crate) fn assign(
         &mut self,
@@ -272,7 +267,7 @@ fn rows<L: Lanes>(record: &[L], p: usize, x: [L; 4], o: [L; 4], kept: [L; 4], al
     let normal = kept[NORMAL_PENALTY].neg_mul_add(error[0], kept[NORMAL]).max(L::zero());
     let normal = is_there.select_positive(normal, L::zero());
     let bound = record[2] * normal;
-    let tangent = kept[TANGENT_PENALTY].neg_mul_add(error[1], kept[TANGENT]).max(-bound).min(bound);
+    let tangent = cone::friction(kept[TANGENT_PENALTY].neg_mul_add(error[1], kept[TANGENT]), bound);
     BlockRows { jacobian: [[n[0], n[1], a_n], [t[0], t[1], a_t]], error, force: [normal, tangent], bound }
 }
 

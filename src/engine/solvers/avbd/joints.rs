@@ -23,10 +23,9 @@
 //! in the source.
 
 use super::input::{DescentInput, PENALTY};
-use crate::engine::constraints::joints::rows::{RowBlock, RowLaw};
-use crate::engine::constraints::kernels::types::{Joined, Placed};
-use crate::engine::constraints::records::rows::ROWS;
-use crate::engine::lanes::held;
+use crate::constraints::joints::rows::{RowBlock, RowLaw};
+use crate::constraints::kernels::types::{Joined, Placed};
+use crate::constraints::records::rows::ROWS;
 
 /// Numbers per row of a block.
 type JointRows = [f32; ROWS];
@@ -70,10 +69,6 @@ struct Forces {
 impl JointDescent {
     pub fn is_empty(&self) -> bool {
         self.places.is_empty()
-    }
-
-    pub fn held_bytes(&self) -> usize {
-        held(&self.places) + held(&self.starts) + held(&self.bodies) + held(&self.blocks) + held(&self.found)
     }
 
     /// Lists the joints. Penalties are kept as long as the joints stay the same.

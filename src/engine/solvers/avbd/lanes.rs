@@ -8,9 +8,9 @@
 //! there are no colors, and bodies are solved one by one in the order in which those contacts first refer to
 //! them.
 
-use crate::engine::constraints::records::graph::Graph;
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{Indices, LaneVec, LaneWidth, held};
+use crate::constraints::records::graph::Graph;
+use crate::contacts::Contact;
+use crate::lanes::{Indices, LaneVec, LaneWidth};
 
 /// Bodies that are solved together.
 #[derive(Clone, Copy, Debug)]
@@ -69,20 +69,9 @@ impl Ends {
         self.other.extend(&[other]);
         self.side.push(side);
     }
-
-    fn held_bytes(&self) -> usize {
-        let lists = [&self.contact, &self.own, &self.other];
-        lists.map(Indices::held_bytes).iter().sum::<usize>() + self.side.bytes()
-    }
 }
 
 impl BodyLanes {
-    /// Bytes held.
-    pub fn held_bytes(&self) -> usize {
-        let lists = self.bodies.held_bytes() + self.ends.held_bytes() + self.contacts.held_bytes();
-        lists + held(&self.batches) + held(&self.order) + held(&self.colors) + held(&self.seen_by)
-    }
-
     /// Bodies that are solved.
     pub(crate) fn solved(&self) -> impl Iterator<Item = usize> {
         self.order.iter().map(|&body| body as usize)

@@ -13,11 +13,10 @@
 //! begun to touch. Discs are always collided: their points do not stay fixed on them, and their manifolds are
 //! just as cheap to find.
 
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::held;
-use crate::engine::narrowphase::batch::{NO_CONTACT, PairKind};
-use crate::engine::narrowphase::candidate::Candidates;
-use crate::engine::narrowphase::lanes::PoseRow;
+use crate::contacts::Contact;
+use crate::narrowphase::batch::{NO_CONTACT, PairKind};
+use crate::narrowphase::candidate::Candidates;
+use crate::narrowphase::lanes::PoseRow;
 use glam::Vec2;
 
 /// Cosine of the relative rotation at which a manifold is recomputed (1).
@@ -110,12 +109,6 @@ impl KeptManifold {
 }
 
 impl Recycled {
-    /// Bytes held.
-    pub fn held_bytes(&self) -> usize {
-        let lists = self.found.iter().chain(&self.last_found);
-        lists.map(held).sum::<usize>() + held(&self.kept)
-    }
-
     /// Updates kept manifolds to the current poses, and marks their candidates in `keep`. With a distance of
     /// zero none are kept.
     pub fn update(

@@ -2,11 +2,12 @@
 //! fixed states, a sweep, Lemke's method. See [`super`].
 
 use super::{PASSES, PIVOTS, SHIFT, TOLERANCE};
-use crate::engine::constraints::numerics::block_lu::{BlockLu, inverse};
-use crate::engine::constraints::numerics::coulomb_lcp::CoulombLcp;
-use crate::engine::constraints::records::rows::{RowBlock, RowLaw};
-use crate::engine::constraints::vectors::system::{Pair, PointRows};
-use crate::engine::lanes::BodyRow;
+use crate::constraints::numerics::block_lu::{BlockLu, inverse};
+use crate::constraints::numerics::cone;
+use crate::constraints::numerics::coulomb_lcp::CoulombLcp;
+use crate::constraints::records::rows::{RowBlock, RowLaw};
+use crate::constraints::vectors::system::{Pair, PointRows};
+use crate::lanes::BodyRow;
 
 /// State of a row in a linear problem.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -264,10 +265,7 @@ impl IslandLaw {
             let argument = argument(i, impulses, &change, &moved, 0.0);
             let new = match i % 2 {
                 0 => argument.max(0.0),
-                _ => {
-                    let bound = self.friction[i / 2] * impulses[i - 1];
-                    argument.max(-bound).min(bound)
-                }
+                _ => cone::friction_f64(argument, self.friction[i / 2] * impulses[i - 1]),
             };
             put(i, new, impulses, &mut change, &mut moved);
         }
@@ -297,8 +295,8 @@ impl IslandLaw {
     pub fn merit(&self, impulses: &[f64], arguments: &[f64]) -> f64 {
         let one = |i: usize| {
             let (normal, tangent) = (arguments[2 * i].max(0.0), arguments[2 * i + 1]);
-            let bound = self.friction[i] * normal;
-            let r = [impulses[2 * i] - normal, impulses[2 * i + 1] - tangent.max(-bound).min(bound)];
+            let tangent = cone::friction_f64(tangent, self.friction[i] * normal);
+            let r = [impulses[2 * i] - normal, impulses[2 * i + 1] - tangent];
             self.diagonal(2 * i) * r[0] * r[0] + self.diagonal(2 * i + 1) * r[1] * r[1]
         };
         let contacts = (0..self.points.len()).map(one).sum::<f64>();
@@ -480,7 +478,7 @@ impl IslandLaw {
     }
 
     /// The impulses of the same law by Lemke's method, see
-    /// [`crate::engine::constraints::numerics::coulomb_lcp`]. Only for islands without joints.
+    /// [`crate::constraints::numerics::coulomb_lcp`]. Only for islands without joints.
     pub fn by_lemke(&self) -> Option<Vec<f64>> {
         if !self.bounds.is_empty() {
             return None;

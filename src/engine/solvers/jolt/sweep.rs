@@ -1,27 +1,24 @@
 //! The velocity sweep: the friction row of a contact, then its normal rows. See the [solver](super).
 
-use crate::engine::constraints::kernels::frame::{
+use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, separation, spin, to_frame, turn,
     with_arms,
 };
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::kernels::stages::{for_each_batch, over_segments};
-use crate::engine::constraints::kernels::velocity::rules::{NormalRule, Rigid};
-use crate::engine::constraints::records::batches::{Batches, Segment};
-use crate::engine::constraints::records::features::{
+use crate::constraints::kernels::pass::{Pass, PassInput};
+use crate::constraints::kernels::stages::{for_each_batch, over_segments};
+use crate::constraints::kernels::velocity::rules::{NormalRule, Rigid};
+use crate::constraints::numerics::cone;
+use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::lanes::{BodyRow, Lanes};
+use crate::lanes::{BodyRow, Lanes};
 
 /// One sweep. Normal rows follow the rule.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ContactFriction(pub Rigid);
 
 impl Pass for ContactFriction {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        PerLane::of_sweep(layout, true, opposite)
-    }
-
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         over_segments!(sweep, L, F; on.rows, on.batches, self.0);
@@ -66,7 +63,7 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
             let mass = k.select_positive(L::splat(1.0) / k, zero);
             let bound = record[layout.friction] * load;
             let vt = with_arms::<L, N, O>(along_t, w, arm);
-            let new = mass.neg_mul_add(vt, old).min(bound).max(-bound);
+            let new = cone::friction(mass.neg_mul_add(vt, old), bound);
             for p in 0..N::POINTS {
                 record[layout.at(p, layout.tangent_impulse)] = new * share * is_point[p];
             }

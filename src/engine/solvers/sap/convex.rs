@@ -24,13 +24,14 @@
 //! In the plane, γ of a contact is piecewise linear. If no block has the bound |γ| ≤ c, ∇ℓ is piecewise
 //! linear as well, and Newton's method ends after finitely many steps.
 
-use crate::engine::constraints::System;
-use crate::engine::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
-use crate::engine::constraints::numerics::envelope::Envelope;
-use crate::engine::constraints::records::rows::{RowBlock, RowLaw};
-use crate::engine::constraints::vectors::blocks::JointBlocks;
-use crate::engine::constraints::vectors::system::{Pair, PointRows};
-use crate::engine::lanes::BodyRow;
+use crate::constraints::System;
+use crate::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
+use crate::constraints::numerics::cone;
+use crate::constraints::numerics::envelope::Envelope;
+use crate::constraints::records::rows::{RowBlock, RowLaw};
+use crate::constraints::vectors::blocks::JointBlocks;
+use crate::constraints::vectors::system::{Pair, PointRows};
+use crate::lanes::BodyRow;
 
 /// A block of three rows and columns.
 type Block3 = [[f64; 3]; 3];
@@ -567,10 +568,6 @@ impl Convex {
 
     /// Writes velocities and impulses to the system.
     pub fn write(&mut self, system: &mut System<'_>) {
-        let bytes = |count: usize, each: usize| (count * each) as f64;
-        let blocks = bytes(self.blocks.len(), size_of::<ConvexBlock>());
-        let matrix = bytes(self.matrix.entries(), size_of::<f64>());
-        system.book([2.0 * (blocks + matrix), blocks + matrix]);
         for (v, body) in self.velocities.iter().zip(&self.bodies) {
             let to = &mut system.rows()[body.row].velocity;
             v.iter().zip(to).for_each(|(v, to)| *to = *v as f32);
@@ -579,8 +576,7 @@ impl Convex {
         for (&at, block) in self.places.iter().zip(&self.blocks) {
             let ImpulseBound::Cone(friction) = block.bound else { continue };
             let normal = (block.impulse[0] as f32).max(0.0);
-            let bound = friction as f32 * normal;
-            impulses[at] = [normal, (block.impulse[1] as f32).min(bound).max(-bound)];
+            impulses[at] = [normal, cone::friction(block.impulse[1] as f32, friction as f32 * normal)];
         }
         system.set_impulses(&impulses);
         if !self.joints.blocks.is_empty() {

@@ -33,12 +33,12 @@
 //!
 //! The arm of a round shape is then c′ ∓ ρ n′; that of a face ends where the other one does.
 
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
-use crate::engine::contacts::{Contact, quad};
-use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
-use crate::engine::params::LINEAR_SLOP;
+use crate::constraints::kernels::pass::{Pass, PassInput};
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::features::{KernelFeatures, Layout};
+use crate::contacts::{Contact, quad};
+use crate::lanes::{BodyRow, LaneIndex, Lanes, Quad};
+use crate::params::LINEAR_SLOP;
 
 /// Largest change of the gap of a rolling contact (m): a fifth of the slop.
 pub(super) const STEADY: f32 = 0.2 * LINEAR_SLOP;
@@ -57,11 +57,6 @@ pub(super) struct Roll {
 }
 
 impl Pass for Roll {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        let (read, written) = (3 + layout.points * (layout.arms() + 2), 3 + layout.arms());
-        PerLane { halves: 0, ..PerLane::of_bodies(read + 8, written, opposite) }
-    }
-
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         on.batches.each_segment(F::layout, |batches, segment, layout| {
             roll::<L>(on.rows, batches, segment, layout, on.contacts, self);

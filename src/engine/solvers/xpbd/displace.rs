@@ -25,19 +25,20 @@
 //!
 //! Source: `muller2020` (sections 3.5 and 3.6), `catto2024solver2d` (`solve_xpbd`: the limit of C).
 
-use crate::engine::constraints::impacts::restitution::{point, restitution_of};
-use crate::engine::constraints::kernels::frame::{
+use crate::constraints::impacts::restitution::{point, restitution_of};
+use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, spin, to_frame, turn, turned,
     with_arms,
 };
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
-use crate::engine::constraints::kernels::stages::{for_each_batch, over_segments};
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::features::{
+use crate::constraints::kernels::pass::{Pass, PassInput, PassMode};
+use crate::constraints::kernels::stages::{for_each_batch, over_segments};
+use crate::constraints::numerics::cone;
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::constraints::records::point_vector::places;
-use crate::engine::lanes::{Block, BodyRow, LaneIndex, Lanes, RowStore};
+use crate::constraints::records::point_vector::places;
+use crate::lanes::{Block, BodyRow, LaneIndex, Lanes, RowStore};
 
 /// Displaces bodies; see the [module](self).
 #[derive(Clone, Copy, Debug)]
@@ -68,11 +69,6 @@ pub(crate) struct Approach<'a> {
 }
 
 impl Pass for Approach<'_> {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        let read = 2 + layout.points * (layout.arms() + 1);
-        PerLane { halves: 0, ..PerLane::of_bodies(read, layout.points, opposite) }
-    }
-
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         let (to, increments): (&mut [L], _) =
             (bytemuck::cast_slice_mut(self.to[on.part as usize]), on.increments);
@@ -101,12 +97,6 @@ impl Pass for Approach<'_> {
 }
 
 impl Pass for Displace<'_> {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        let once = PerLane::of_sweep(layout, true, opposite);
-        // Current bodies, and bodies before displacements.
-        PerLane { rows: 2 * once.rows, ..once }
-    }
-
     fn mode(&self) -> PassMode {
         PassMode::Position { max_correction: [f32::INFINITY; 2], impulses: true }
     }
@@ -119,10 +109,6 @@ impl Pass for Displace<'_> {
 }
 
 impl Pass for AfterDisplacing<'_> {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        PerLane::of_sweep(layout, true, opposite)
-    }
-
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         match &*self.rebounds[on.part as usize] {
@@ -141,7 +127,7 @@ struct Displaced<'a> {
 
 impl RowStore for Displaced<'_> {
     #[inline(always)]
-    fn assert_rows(&self, index: crate::engine::lanes::IndexList) {
+    fn assert_rows(&self, index: crate::lanes::IndexList) {
         self.rows.assert_rows(index);
         self.before.assert_rows(index);
     }
@@ -295,7 +281,7 @@ fn correct<L: Lanes, N: KernelFeatures, O: Opposite, const BOUNCES: bool>(
                 let vt = with_arms::<L, N, O>(along_t, w, arm);
                 let bound = record[layout.friction] * pushed;
                 let stop = -(record[layout.at(p, layout.tangent_mass)] * vt);
-                let delta = stop.min(bound).max(-bound);
+                let delta = cone::friction(stop, bound);
                 sum[1] = sum[1] + delta;
                 along_t = mass_sum.mul_add(delta, along_t);
                 spin::<L, N, O>(&mut w, inertia, arm, delta);

@@ -9,11 +9,11 @@
 //! by step if a limb is caught in another.
 
 use super::{AHEAD, BOUNCES};
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
+use crate::constraints::kernels::pass::{Pass, PassInput};
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::features::{KernelFeatures, Layout};
+use crate::contacts::Contact;
+use crate::lanes::{BodyRow, LaneIndex, Lanes, Quad};
 
 /// Finds contacts that are hit; see the [module](self).
 pub(crate) struct Find<'a> {
@@ -34,13 +34,6 @@ pub(crate) struct Find<'a> {
 }
 
 impl Pass for Find<'_> {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        // Half a row of accelerations for each dynamic body.
-        let accelerations = if opposite == OppositeKind::Dynamic { 8 } else { 4 };
-        let read = 2 + accelerations + layout.points * (layout.arms() + 2);
-        PerLane { halves: 0, ..PerLane::of_bodies(read, 0, opposite) }
-    }
-
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         on.batches.each_segment(F::layout, |batches, segment, layout| {
             find::<L>(on.rows, batches, segment, layout, on.contacts, on.increments, self);

@@ -50,9 +50,8 @@ mod law;
 mod pair;
 mod point;
 
-use crate::engine::constraints::impacts::touch::Round;
-use crate::engine::disjoint::DisjointSets;
-use crate::engine::lanes::held;
+use crate::constraints::impacts::touch::Round;
+use crate::disjoint::DisjointSets;
 pub(crate) use find::{Find, impact_speeds};
 use law::{lossy_impulses, rough_impulses};
 pub(crate) use point::SpreadInput;
@@ -118,18 +117,6 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Bytes held.
-    pub fn held_bytes(&self) -> usize {
-        let lists = [&self.next, &self.listed, &self.pushed, &self.found[0], &self.found[1]];
-        let queue = self.queue.capacity() * size_of::<u32>();
-        lists.map(held).iter().sum::<usize>()
-            + self.islands.bytes()
-            + held(&self.points)
-            + held(&self.bodies)
-            + held(&self.hit)
-            + queue
-    }
-
     /// Where [`find`] writes what it finds.
     pub(crate) fn found(&mut self) -> &mut [Vec<u32>; 2] {
         &mut self.found

@@ -72,12 +72,11 @@
 pub(super) mod records;
 mod system;
 
-use crate::engine::constraints::joints::ANCHORS;
-use crate::engine::constraints::kernels::types::Joined;
-use crate::engine::constraints::kernels::velocity::masses::ScaledMasses;
-use crate::engine::constraints::records::links::{ChainLink, LinkRule};
-use crate::engine::lanes::{BodyRow, held};
-use crate::engine::narrowphase::lanes::PoseRow;
+use crate::constraints::kernels::types::Joined;
+use crate::constraints::kernels::velocity::masses::ScaledMasses;
+use crate::constraints::records::links::{ChainLink, LinkRule};
+use crate::lanes::BodyRow;
+use crate::narrowphase::lanes::PoseRow;
 pub use system::ChainStage;
 use system::ChainSystem;
 
@@ -251,14 +250,6 @@ impl Chains {
         true
     }
 
-    /// Bytes that [`Self::solve`] reads and writes, without the numbers of types.
-    pub fn traffic(&self) -> [f64; 2] {
-        // Rows are made from anchors, two indices and both bodies.
-        let [read, written] = self.system.traffic();
-        let rows = 4 * (ANCHORS + 2) + 2 * size_of::<BodyRow>();
-        [read + (self.system.slots() * rows) as f64, written]
-    }
-
     /// Copies the impulses to the types.
     pub fn give_impulses(&self, types: &mut [Joined]) {
         for (joined, links) in types.iter_mut().zip(&self.links) {
@@ -266,23 +257,6 @@ impl Chains {
                 joined.kind.set_linked(self.system.impulses());
             }
         }
-    }
-
-    /// Bytes held.
-    pub fn held_bytes(&self) -> usize {
-        let ChainSearch { starts, joined, places, ends, found } = &self.search;
-        held(&self.ends)
-            + held(&self.moves)
-            + self.links.iter().map(held).sum::<usize>()
-            + self.system.held_bytes()
-            + held(starts)
-            + held(joined)
-            + held(places)
-            + held(ends)
-            + held(found)
-            + held(&self.loaded)
-            + held(&self.shares)
-            + self.masses.held_bytes()
     }
 }
 

@@ -37,10 +37,10 @@
 mod apparent;
 mod blocks;
 
-use crate::engine::constraints::joints::rows::dot;
-use crate::engine::constraints::kernels::frame::{VX, VY, W};
-use crate::engine::constraints::records::links::{LINK_LANES, LinkGroups, LinkImpulses, LinkRows};
-use crate::engine::lanes::{BodyRow, Indices, LaneIndex, Lanes, held};
+use crate::constraints::joints::rows::dot;
+use crate::constraints::kernels::frame::{VX, VY, W};
+use crate::constraints::records::links::{LINK_LANES, LinkGroups, LinkImpulses, LinkRows};
+use crate::lanes::{BodyRow, Indices, LaneIndex, Lanes};
 use apparent::Apparent;
 use blocks::{Factor, LaneMatrix, LaneVector, down, each, less, minus, reduce, transposed, up};
 use wide::f32x8;
@@ -374,32 +374,6 @@ impl ChainSystem {
 
     fn bodies_of(&self, group: usize) -> LaneIndex<'_, [u32; LINK_LANES]> {
         self.bodies.list().batch(group)
-    }
-
-    /// Bytes that a solve reads and writes: rows written once and read twice, the eliminated blocks,
-    /// impulses, and bodies R with their indices.
-    pub fn traffic(&self) -> [f64; 2] {
-        let (row, kept) = (5 * self.size + 4, 2 * self.size * self.size + self.size);
-        let half = size_of::<BodyRow>() / 2;
-        let (read, written) = (4 * (2 * row + kept + 2) + half, 4 * (row + kept + self.size + 4) + half);
-        [read, written].map(|bytes| (self.slots() * bytes) as f64)
-    }
-
-    /// Bytes held.
-    pub fn held_bytes(&self) -> usize {
-        self.rows.held_bytes()
-            + self.impulses.held_bytes()
-            + self.bodies.held_bytes()
-            + held(&self.velocities)
-            + held(&self.pulls)
-            + held(&self.slowing)
-            + held(&self.alone)
-            + held(&self.turning)
-            + held(&self.chains)
-            + held(&self.moved)
-            + held(&self.taken)
-            + self.eliminated.held_bytes()
-            + self.apparent.held_bytes()
     }
 }
 

@@ -5,7 +5,7 @@
 //!
 //! # Derivation
 //!
-//! A [rule](crate::engine::constraints::kernels::velocity::rules::NormalRule) gives each row the line λ =
+//! A [rule](crate::constraints::kernels::velocity::rules::NormalRule) gives each row the line λ =
 //! max(0, c − s v), where v is the normal velocity of the row. With both rows solved at once, row p also sees
 //! the change of the other row, v_p = v_p⁰ + k₁₂ (λ_q − λ_q⁰). Dividing by s > 0 gives
 //!
@@ -43,18 +43,18 @@
 //! then exact at the end of the sweep (`catto2024solver2d`, `solve_pgs_ngs_block`). Or friction rows last,
 //! bounded by the new normal impulses: the cone then holds, and sliding contacts use the current load.
 
-use crate::engine::constraints::kernels::frame::{
+use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_MASS, TURN, arms, separation, spin, to_frame, turn, with_arms,
 };
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
-use crate::engine::constraints::kernels::velocity::rules::Softness;
-use crate::engine::constraints::kernels::velocity::sweep::{NormalRule, Rows, unbounded_friction};
-use crate::engine::constraints::records::batches::{Batches, Segment};
-use crate::engine::constraints::records::features::{
+use crate::constraints::kernels::pass::{Pass, PassInput};
+use crate::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
+use crate::constraints::kernels::velocity::rules::Softness;
+use crate::constraints::kernels::velocity::sweep::{NormalRule, Rows, unbounded_friction};
+use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::lanes::{BodyRow, Lanes};
+use crate::lanes::{BodyRow, Lanes};
 
 /// A matrix with a determinant below this fraction of a₁₁ a₂₂ is solved row by row (1).
 const SINGULAR: f32 = 1e-3;
@@ -64,10 +64,6 @@ const SINGULAR: f32 = 1e-3;
 pub struct BlockSweep<R, const NORMAL_FIRST: bool>(pub R);
 
 impl<R: NormalRule, const NORMAL_FIRST: bool> Pass for BlockSweep<R, NORMAL_FIRST> {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        PerLane::of_sweep(layout, R::FRICTION, opposite)
-    }
-
     fn law(&self) -> Softness {
         self.0.of_errors()
     }
@@ -129,8 +125,8 @@ fn friction_rows<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
     for p in 0..N::POINTS {
         let arm = arms::<L, N, O>(record, &layout, p, 1);
         let vt = with_arms::<L, N, O>(along_t, state.w, arm);
-        let bound = friction * record[layout.at(p, layout.normal_impulse)];
-        let new = unbounded_friction(record, &layout, p, rule, vt).min(bound).max(-bound);
+        let wanted = unbounded_friction(record, &layout, p, rule, vt);
+        let new = rule.friction(wanted, record[layout.at(p, layout.normal_impulse)], friction);
         let at = layout.at(p, layout.tangent_impulse);
         let delta = new - record[at];
         record[at] = new;
@@ -251,7 +247,7 @@ where
             }
         }
         if friction_last {
-            tangent.solve_friction::<N, O>(record, &layout, new, mass_sum, state);
+            tangent.solve_friction::<N, O>(self.rule, record, &layout, new, mass_sum, state);
         }
         if const { NORMAL_FIRST || !N::FRICTION || !R::FRICTION } {
             state.sum[1] = tangent.sum;

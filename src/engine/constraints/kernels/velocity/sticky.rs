@@ -3,7 +3,7 @@
 //! Each point stores its drift d along the surface since it began to stick (m). Its friction row aims at v_t
 //! = −β_t d/h, which brings a creeping point back. If this exceeds the cone, the point slides and begins to
 //! stick again at its current position. Normal rows are those of
-//! [`crate::engine::constraints::kernels::velocity::rules::Baumgarte`] without slop. The cone of each point
+//! [`crate::constraints::kernels::velocity::rules::Baumgarte`] without slop. The cone of each point
 //! uses its share of the manifold's normal impulse, Σ λn/points, so a load that shifts from point to point
 //! unsticks neither.
 //!
@@ -17,7 +17,7 @@
 //!
 //! Drifts follow contacts from step to step in [`Kept`]. Within a step they are in lane order, in the
 //! tangential entries of a vector laid out as a
-//! [`crate::engine::constraints::records::point_vector::PointVector`], so a sweep reads and writes them
+//! [`crate::constraints::records::point_vector::PointVector`], so a sweep reads and writes them
 //! without gathering.
 //!
 //! Source: `catto2024solver2d` (`solve_tgs_sticky`).
@@ -29,19 +29,20 @@
 //! step. A flag per point marks sliding contacts, in the normal entry of the vector. A point that has a gap
 //! at the start of the step uses the rate 1/h of gaps for the whole step.
 
-use crate::engine::constraints::kernels::frame::{
+use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, spin, to_frame, turn, with_arms,
 };
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::kernels::stages::over_segments;
-use crate::engine::constraints::kernels::velocity::rules::Softness;
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::features::{
+use crate::constraints::kernels::pass::{Pass, PassInput};
+use crate::constraints::kernels::stages::over_segments;
+use crate::constraints::kernels::velocity::rules::Softness;
+use crate::constraints::numerics::cone;
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::features::{
     KernelFeatures, Layout, LayoutOf, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::constraints::records::kept::Kept;
-use crate::engine::constraints::records::point_vector::places;
-use crate::engine::lanes::{Block, BodyRow, Lanes, RowStore};
+use crate::constraints::records::kept::Kept;
+use crate::constraints::records::point_vector::places;
+use crate::lanes::{Block, BodyRow, Lanes, RowStore};
 
 /// Parameters of a sweep; see the [module](self). The solver keeps one float per contact point.
 #[derive(Clone, Copy, Debug)]
@@ -91,15 +92,6 @@ pub(crate) struct BookDrift<'a> {
 }
 
 impl Pass for StickySweep<'_> {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        let sweep = PerLane::of_sweep(layout, true, opposite);
-        PerLane {
-            floats_read: sweep.floats_read + layout.points,
-            floats_written: sweep.floats_written + layout.points,
-            ..sweep
-        }
-    }
-
     fn law(&self) -> Softness {
         Softness { bias_rate: self.sticky.fraction / self.sticky.h, ..Softness::RIGID }
     }
@@ -111,22 +103,12 @@ impl Pass for StickySweep<'_> {
 }
 
 impl Pass for LoadDrift<'_> {
-    fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
-        PerLane { floats_read: 1 + layout.points, floats_written: layout.points, ..PerLane::default() }
-    }
-
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         load::<L>(on.batches, on.kept, self.drifts[on.part as usize], F::layout);
     }
 }
 
 impl Pass for BookDrift<'_> {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        // Reads the record, the drifts and the index by which they are stored.
-        let read = 3 + layout.points * (layout.arms() + 2);
-        PerLane { halves: 0, ..PerLane::of_bodies(read, layout.points, opposite) }
-    }
-
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         over_segments!(book, L, F; on.rows, on.batches, on.kept, self.drifts[on.part as usize], self.reach);
@@ -259,7 +241,7 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
                 let at = layout.at(p, layout.tangent_impulse);
                 let old = record[at];
                 let wanted = mass.neg_mul_add(vt, old);
-                let new = wanted.min(bound).max(-bound);
+                let new = cone::friction(wanted, bound);
                 record[at] = new;
                 let over = wanted.max(-wanted) - bound;
                 if patch.is_some() {

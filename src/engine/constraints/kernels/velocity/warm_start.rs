@@ -1,15 +1,13 @@
 //! The warm start: the impulses of the previous step serve as the initial guess of this one.
 
-use crate::engine::constraints::kernels::frame::{
-    BodyPair, INV_INERTIA, TURN, W, apply, arms, spin, turn, turned,
-};
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::kernels::stages::{for_each_batch, over_segments};
-use crate::engine::constraints::records::batches::{Batches, Segment};
-use crate::engine::constraints::records::features::{
+use crate::constraints::kernels::frame::{BodyPair, INV_INERTIA, TURN, W, apply, arms, spin, turn, turned};
+use crate::constraints::kernels::pass::{Pass, PassInput};
+use crate::constraints::kernels::stages::{for_each_batch, over_segments};
+use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::lanes::{BodyRow, Lanes};
+use crate::lanes::{BodyRow, Lanes};
 
 /// The warm start: applies the accumulated impulses, with the arms at the start of the step or with arms that
 /// turn with their bodies.
@@ -19,13 +17,6 @@ pub struct WarmStart {
 }
 
 impl Pass for WarmStart {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        // Without friction, only the arms along the normal are read.
-        let impulses = if layout.has_friction { 2 } else { 1 };
-        let arms = if layout.has_friction { layout.arms() } else { layout.arms() / 2 };
-        PerLane::of_bodies(2 + layout.points * (impulses + arms), 0, opposite)
-    }
-
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         if self.turned {

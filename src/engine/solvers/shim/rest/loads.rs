@@ -7,10 +7,11 @@
 //! ```
 
 use super::closed::{arms_of, push, store};
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
-use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
+use crate::constraints::kernels::pass::{Pass, PassInput};
+use crate::constraints::numerics::cone;
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::features::{KernelFeatures, Layout};
+use crate::lanes::{BodyRow, LaneIndex, Lanes, Quad};
 
 /// See the [module](self).
 pub(in super::super) struct LoadSweep<'a> {
@@ -21,10 +22,6 @@ pub(in super::super) struct LoadSweep<'a> {
 }
 
 impl Pass for LoadSweep<'_> {
-    fn traffic(&self, layout: &Layout, opposite: OppositeKind) -> PerLane {
-        PerLane::of_bodies(7 + layout.points * (layout.arms() + 2), 4, opposite)
-    }
-
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         on.batches.each_segment(F::layout, |batches, segment, layout| {
             sweep::<L>(self.fields, batches, segment, layout, on.kept.contacts(), self.h);
@@ -68,7 +65,7 @@ fn sweep<L: Lanes>(
                 let bound = record[layout.friction] * new;
                 let old = loads[2 * p + 1] * h;
                 let wanted = mass(layout.tangent_mass).neg_mul_add(along(ny, -nx, 1, &a, &b), old);
-                let new = is_closed.select_positive(wanted.min(bound).max(-bound), old);
+                let new = is_closed.select_positive(cone::friction(wanted, bound), old);
                 push([&mut a, &mut b], [nx, ny], arms, [zero, new - old]);
                 loads[2 * p + 1] = new * per_substep;
             }

@@ -64,11 +64,11 @@
 //! shortened for its load once, when it is calm for the first time. After that its preload only falls.
 
 use super::closed::{CALM_TIME, NEARLY};
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::kernels::velocity::rules::{Soft, Softness};
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
-use crate::engine::lanes::{LaneIndex, Lanes, Quad, prefetch_quad};
+use crate::constraints::kernels::pass::{Pass, PassInput};
+use crate::constraints::kernels::velocity::rules::{Soft, Softness};
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
+use crate::lanes::{LaneIndex, Lanes, Quad, prefetch_quad};
 
 /// See the [module](self).
 #[derive(Clone, Copy, Debug)]
@@ -95,11 +95,6 @@ const RISE: f32 = 3.0;
 const AHEAD: usize = 3;
 
 impl Pass for Shorten {
-    fn traffic(&self, layout: &Layout, _: OppositeKind) -> PerLane {
-        // Loads, separation and mass of each point, and the index of the contact.
-        PerLane { floats_read: 9 + 2 * layout.points, floats_written: layout.points, ..PerLane::default() }
-    }
-
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         on.batches.each_segment(F::layout, |batches, segment, layout| {
             shorten::<L>(batches, segment, layout, on.kept.contacts(), self);

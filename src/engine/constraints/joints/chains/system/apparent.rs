@@ -35,8 +35,8 @@
 //! ends.
 
 use super::{ChainSystem, GIVE, up, velocity_of};
-use crate::engine::constraints::records::links::LINK_LANES;
-use crate::engine::lanes::{BodyRow, Lanes, held};
+use crate::constraints::records::links::LINK_LANES;
+use crate::lanes::{BodyRow, Lanes};
 use glam::{DMat3, DVec3};
 use std::ops::Range;
 use wide::f32x8;
@@ -88,10 +88,6 @@ impl Apparent {
         self.shares.clear();
         self.shares.resize(groups, f32x8::ONE);
         self.lends = false;
-    }
-
-    pub(super) fn held_bytes(&self) -> usize {
-        held(&self.shares) + held(&self.joints) + held(&self.beyond)
     }
 }
 
