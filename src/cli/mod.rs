@@ -36,7 +36,7 @@ use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides;
 use crate::lab::report::columns::{self, Column, SHEETS, Sheet};
 use crate::lab::scenes::tolerance::Tolerance;
-use crate::lab::scenes::{self, CATALOG, Description, SCHEMA};
+use crate::lab::scenes::{self, CATALOG, Description};
 use crate::lab::study::{DEFAULT_SOLVERS, budget, is_path, open_scene};
 use crate::lab::units::{bodies, si};
 use args::{Cli, Command, CompletionArgs, ListArgs, SceneArgs};
@@ -257,7 +257,7 @@ fn completions(args: &CompletionArgs) -> Result<ExitCode, Error> {
 fn scene(args: &SceneArgs) -> Result<String, Error> {
     let name = match &args.name {
         Some(name) if !args.schema => name,
-        _ => return Ok(SCHEMA.to_string()),
+        _ => return Ok(scenes::schema()),
     };
     let scene = match args.json || is_path(name) {
         true => open_scene(name, args.seed, None, None)?,
