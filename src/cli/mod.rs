@@ -3,7 +3,6 @@
 //! Exit code 0 is success, 1 a simulation that diverged or a comparison that found a regression, 2 an invalid
 //! request, 130 a signal.
 
-pub mod ablate;
 pub mod advise;
 pub mod agree;
 pub mod args;
@@ -17,6 +16,7 @@ pub mod output;
 pub mod papers;
 pub mod profile;
 pub mod progress;
+pub mod random;
 pub mod replay;
 pub mod report;
 pub mod run;
@@ -24,7 +24,6 @@ pub mod savings;
 pub mod snapshot;
 pub mod study;
 pub mod times;
-pub mod torture;
 pub mod values;
 pub mod verify;
 
@@ -108,9 +107,7 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Capture(args)) => capture::run(&args),
         Some(Command::Converge(args)) => converge::run(&args),
         Some(Command::Verify(args)) => verify::run(&args),
-        Some(Command::Ablate(args)) => ablate::run(&args),
         Some(Command::Agree(args)) => agree::run(&args),
-        Some(Command::Torture(args)) => torture::run(&args),
         Some(Command::Profile(args)) => profile::run(&args),
         Some(Command::Growth(args)) => growth::run(&args),
         Some(Command::Savings(args)) => savings::run(&args),

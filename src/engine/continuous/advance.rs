@@ -19,7 +19,7 @@
 //! and t may advance by the minimum over all vertices. Near the surface the second bound is a Newton step.
 //! Along one axis each such step costs a few products; then the distance is recomputed. A tip that turns away
 //! is reached after two axes. With the first bound alone it took 32: the longest step of
-//! `simpulse torture --seed 4 --only fast:49 --pace 60`, in which eight bodies hit walls, was 4.3 medians
+//! `simpulse verify --random fast:49 --seed 4 --pace 60`, in which eight bodies hit walls, was 4.3 medians
 //! instead of 1.4.
 //!
 //! The middle of b is at least its half width w farther along n than its surface, and moves along n by at

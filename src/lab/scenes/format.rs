@@ -36,6 +36,7 @@ pub const DEFAULT_STEPS: u32 = 300;
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(title = "simpulse scene")]
 pub struct Scene {
     /// Name in tables; not empty.
     pub name: String,
@@ -202,7 +203,7 @@ impl Scene {
     pub fn from_json(text: &str, path: &Path) -> Result<Self, Error> {
         let failed = |message| Error::Format { path: path.to_path_buf(), message };
         let mut reader = serde_json::Deserializer::from_str(text);
-        let scene: Scene = serde_path_to_error::deserialize(&mut reader).map_err(|e| failed(at_place(&e)))?;
+        let scene: Scene = serde_path_to_error::deserialize(&mut reader).map_err(|e| failed(at_place(text, &e)))?;
         reader.end().map_err(|e| failed(e.to_string()))?;
         scene.validate().map_err(|e| failed(e.to_string()))?;
         Ok(scene)
@@ -240,15 +241,20 @@ pub fn schema() -> String {
 /// Longest place that a message repeats (characters), to leave room for the message.
 const LONGEST_PLACE: usize = 120;
 
-/// The place of an error, and the error.
-fn at_place(error: &serde_path_to_error::Error<serde_json::Error>) -> String {
-    let place = error.path().to_string();
+/// The place of an error and the error, with the number if that is out of range.
+fn at_place(text: &str, error: &serde_path_to_error::Error<serde_json::Error>) -> String {
+    let inner = error.inner();
+    let mut message = inner.to_string();
+    if message.starts_with("number out of range") {
+        let before = text.lines().nth(inner.line().saturating_sub(1)).and_then(|l| l.get(..inner.column()));
+        let number = |c: char| c.is_ascii_alphanumeric() || "+-.".contains(c);
+        let end = before.unwrap_or_default().trim_end_matches(|c| !number(c));
+        message += &format!(" ({})", &end[end.trim_end_matches(number).len()..]);
+    }
+    let place: String = error.path().to_string();
     let cut: String = place.chars().take(LONGEST_PLACE).collect();
     let more = if cut.len() < place.len() { "…" } else { "" };
-    match place.as_str() {
-        "." | "?" => error.inner().to_string(),
-        _ => format!("{cut}{more}: {}", error.inner()),
-    }
+    if [".", "?"].contains(&place.as_str()) { message } else { format!("{cut}{more}: {message}") }
 }
 
 fn default_gravity() -> [f64; 2] {

@@ -43,7 +43,7 @@
 //! next to another one. An island has at most 32 waves, of which the last 4 only stop, and a visit limit that
 //! grows with its number of points ([`VISITS`]). The solver stops points that still approach after that.
 //! Bodies of such an island that would end deeper in another body than they began are not moved. So the time
-//! of a step is bounded: `simpulse torture --pace 3` measures it as a multiple of the median.
+//! of a step is bounded: `simpulse verify --random 1000 --pace 3` measures it as a multiple of the median.
 
 mod find;
 mod law;
