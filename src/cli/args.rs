@@ -1,6 +1,5 @@
 //! The command line: commands and their options.
 
-use super::ablate::AblateArgs;
 use super::advise::AdviseArgs;
 use super::agree::AgreeArgs;
 use super::capture::CaptureArgs;
@@ -15,7 +14,6 @@ use super::run::RunArgs;
 use super::savings::SavingsArgs;
 use super::snapshot::SnapshotArgs;
 use super::study::{EXAMPLES as STUDY_EXAMPLES, StudyArgs};
-use super::torture::TortureArgs;
 use super::values;
 use super::verify::VerifyArgs;
 use clap::{Args, Parser, Subcommand};
@@ -69,9 +67,7 @@ pub enum Command {
     Capture(CaptureArgs),
     Converge(ConvergeArgs),
     Verify(VerifyArgs),
-    Ablate(AblateArgs),
     Agree(AgreeArgs),
-    Torture(TortureArgs),
     Profile(ProfileArgs),
     Savings(SavingsArgs),
     Papers(PapersArgs),

@@ -3,7 +3,6 @@
 //! Exit code 0 is success, 1 a simulation that diverged or a comparison that found a regression, 2 an invalid
 //! request, 130 a signal.
 
-pub mod ablate;
 pub mod advise;
 pub mod agree;
 pub mod args;
@@ -16,6 +15,7 @@ pub mod output;
 pub mod papers;
 pub mod profile;
 pub mod progress;
+pub mod random;
 pub mod replay;
 pub mod report;
 pub mod run;
@@ -23,7 +23,6 @@ pub mod savings;
 pub mod snapshot;
 pub mod study;
 pub mod times;
-pub mod torture;
 pub mod values;
 pub mod verify;
 
@@ -35,7 +34,7 @@ use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides;
 use crate::lab::report::columns::{self, Column, SHEETS, Sheet};
 use crate::lab::scenes::tolerance::Tolerance;
-use crate::lab::scenes::{self, CATALOG, Description, SCHEMA};
+use crate::lab::scenes::{self, CATALOG, Description};
 use crate::lab::study::{DEFAULT_SOLVERS, budget, is_path, open_scene};
 use crate::lab::units::{bodies, si};
 use args::{Cli, Command, CompletionArgs, ListArgs, SceneArgs};
@@ -107,9 +106,7 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Capture(args)) => capture::run(&args),
         Some(Command::Converge(args)) => converge::run(&args),
         Some(Command::Verify(args)) => verify::run(&args),
-        Some(Command::Ablate(args)) => ablate::run(&args),
         Some(Command::Agree(args)) => agree::run(&args),
-        Some(Command::Torture(args)) => torture::run(&args),
         Some(Command::Profile(args)) => profile::run(&args),
         Some(Command::Savings(args)) => savings::run(&args),
         Some(Command::Papers(args)) => papers::run(&args),
@@ -255,7 +252,7 @@ fn completions(args: &CompletionArgs) -> Result<ExitCode, Error> {
 fn scene(args: &SceneArgs) -> Result<String, Error> {
     let name = match &args.name {
         Some(name) if !args.schema => name,
-        _ => return Ok(SCHEMA.to_string()),
+        _ => return Ok(scenes::schema()),
     };
     let scene = match args.json || is_path(name) {
         true => open_scene(name, args.seed, None, None)?,

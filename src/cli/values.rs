@@ -146,7 +146,7 @@ pub struct ImpactArgs {
 /// `--without` of commands that run a solver.
 #[derive(Args, Clone, Debug, Default)]
 pub struct WithoutArgs {
-    /// Mechanisms of the solver to leave out (`simpulse ablate` shows what each is for)
+    /// Mechanisms of the solver to leave out (`simpulse verify --without all` shows what each is for)
     #[arg(long, value_delimiter = ',', value_name = "NAME,…", value_parser = NonEmptyStringValueParser::new())]
     pub without: Vec<String>,
 }

@@ -107,39 +107,9 @@ pub struct Mechanism {
     pub name: &'static str,
     /// Its purpose in one line.
     pub meaning: &'static str,
-    /// A check that fails without it: a case of `simpulse verify`, a test, or `torture` with a family and the
+    /// A check that fails without it: a case of `simpulse verify`, a test, or `random` with a family and the
     /// kind of failure that becomes more frequent.
     pub case: &'static str,
-    /// Lines of code in the files of this mechanism alone, see [`lines_of`].
-    pub lines: u32,
-}
-
-/// Lines of a source text that are neither blank nor comments, up to its unit tests.
-pub const fn lines_of(text: &str) -> u32 {
-    let (text, mut i, mut count) = (text.as_bytes(), 0, 0);
-    while i < text.len() && !begins(text, i, b"#[cfg(test)]") {
-        while i < text.len() && text[i] == b' ' {
-            i += 1;
-        }
-        let is_comment = i + 1 < text.len() && text[i] == b'/' && text[i + 1] == b'/';
-        if i < text.len() && text[i] != b'\n' && !is_comment {
-            count += 1;
-        }
-        while i < text.len() && text[i] != b'\n' {
-            i += 1;
-        }
-        i += 1;
-    }
-    count
-}
-
-/// Whether `text` contains `with` at position `at`.
-const fn begins(text: &[u8], at: usize, with: &[u8]) -> bool {
-    let mut k = 0;
-    while k < with.len() && at + k < text.len() && text[at + k] == with[k] {
-        k += 1;
-    }
-    k == with.len()
 }
 
 /// The set of a solver's disabled mechanisms, by index in its table; empty by default.

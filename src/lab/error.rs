@@ -9,7 +9,7 @@ use std::path::PathBuf;
 const LONGEST: usize = 400;
 
 /// Longest name for which a similar one is searched (bytes). Memory and time grow with its length.
-pub(in crate::lab) const LONGEST_MISSPELT: usize = 100;
+const LONGEST_MISSPELT: usize = 100;
 
 /// Errors caused by input; each variant carries the offending value. Every message is one line, whatever the
 /// value is.

@@ -20,7 +20,7 @@ fn every_mechanism_has_a_case_that_fails_without_it() {
     for variant in VARIANTS {
         for (place, mechanism) in variant.mechanisms.iter().enumerate() {
             let (name, without) = (mechanism.name, Without::default().and(place));
-            if let Some(of) = mechanism.case.strip_prefix("torture ") {
+            if let Some(of) = mechanism.case.strip_prefix("random ") {
                 let (of, word) = of.split_once(' ').unwrap();
                 let verdict = TortureVerdict::ALL.into_iter().find(|v| v.word() == word).unwrap();
                 let failing = |without| {

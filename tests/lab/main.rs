@@ -23,7 +23,6 @@ mod rest;
 mod rivals;
 mod saved;
 mod scenes;
-mod schema;
 mod solver2d;
 mod solver_rules;
 mod truth;

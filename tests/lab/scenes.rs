@@ -57,20 +57,8 @@ fn names_are_unique_and_summaries_are_one_line() {
 /// Every file of the folder that is not machinery declares entries, and every entry has a row.
 #[test]
 fn every_scene_file_has_its_rows() {
-    const MACHINERY: [&str; 12] = [
-        "mod",
-        "check",
-        "expect",
-        "expected",
-        "format",
-        "holds",
-        "joints",
-        "linked",
-        "parts",
-        "place",
-        "tolerance",
-        "truth",
-    ];
+    const MACHINERY: [&str; 10] =
+        ["mod", "check", "expect", "format", "holds", "joints", "linked", "parts", "tolerance", "truth"];
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/lab/scenes");
     let rows = std::fs::read_to_string(folder.join("mod.rs")).unwrap();
     let mut found = 0;
@@ -392,7 +380,7 @@ fn bad_files_are_refused_with_place_and_value() {
     let table = [
         (r#""name": "test""#, r#""name": """#, "name: ", "''"),
         (r#""name": "test""#, r#""name": "a\n\u001b[31m""#, "name: ", r#"is "a\n\u{1b}[31m""#),
-        (r#""name": "test""#, "\"na\nme\": \"test\"", r"na\n: ", "control character"),
+        (r#""name": "test""#, "\"na\nme\": \"test\"", "", "control character"),
         (r#""name": "test", "#, "", "missing field `name`", "line 4"),
         (r#""dt": 0.01"#, r#""dt": 0"#, "dt: ", "0.0"),
         (r#""dt": 0.01"#, r#""dt": -0.01"#, "dt: ", "-0.01"),
@@ -413,15 +401,15 @@ fn bad_files_are_refused_with_place_and_value() {
         ("[0, -10]", "[0, 1e999]", "gravity[1]: ", "1e999"),
         ("[0, -10]", "[0, NaN]", "gravity[1]: ", "line 1 column"),
         ("[0, -10]", "[0]", "gravity", "length 1"),
-        (r#""gravity""#, r#""gravty""#, "gravty: ", "did you mean `gravity`?"),
-        (r#""steps": 10"#, r#""hinges": []"#, "hinges: ", "unknown field"),
-        (r#""steps": 10"#, r#""ste\nps": 10"#, r"ste\nps: ", r"unknown field `ste\nps`"),
-        (r#""steps": 10"#, r#""dt": 1"#, "dt: ", "duplicate field"),
+        (r#""gravity""#, r#""gravty""#, "", "unknown field `gravty`"),
+        (r#""steps": 10"#, r#""hinges": []"#, "", "unknown field `hinges`"),
+        (r#""steps": 10"#, r#""ste\nps": 10"#, "", r"unknown field `ste\nps`"),
+        (r#""steps": 10"#, r#""dt": 1"#, "", "duplicate field `dt`"),
         ("[1, 2]", "[1, -1e300]", "bodies[1].position[1]: ", "-1e300"),
         ("[1, 2]", "[1, null]", "bodies[1].position[1]: ", "null"),
         (r#""position": [1, 2], "#, "", "bodies[1]: ", "missing field `position`"),
         (r#""angle": 0.5"#, r#""angle": "north""#, "bodies[1].angle: ", "north"),
-        (r#""angle": 0.5"#, r#""angel": 0.5"#, "bodies[1].angel: ", "did you mean `angle`?"),
+        (r#""angle": 0.5"#, r#""angel": 0.5"#, "bodies[1]: ", "unknown field `angel`"),
         (r#""linear_damping": 0.1"#, r#""linear_damping": -1"#, "bodies[1].linear_damping: ", "-1.0"),
         (r#""dynamic""#, r#""rigid""#, "bodies[1].type: ", "rigid"),
         (r#""density": 2"#, r#""density": 0"#, &format!("{shape}.density: "), "0.0"),
@@ -429,7 +417,7 @@ fn bad_files_are_refused_with_place_and_value() {
         (r#""density": 2"#, r#""density": 1e999"#, &format!("{shape}.density: "), "1e999"),
         (r#""density": 2"#, r#""density": 1e39"#, &format!("{shape}.density: "), "1e39"),
         (r#""density": 2"#, r#""density": 1e-40"#, "bodies[1].shapes: ", "mass"),
-        (r#""density": 2"#, r#""densty": 2"#, &format!("{shape}.densty: "), "did you mean `density`?"),
+        (r#""density": 2"#, r#""densty": 2"#, &format!("{shape}: "), "unknown field `densty`"),
         (r#""friction": 0.3"#, r#""friction": -0.3"#, &format!("{shape}.friction: "), "-0.3"),
         (r#""friction": 0.3"#, r#""friction": 1e25"#, &format!("{shape}.friction: "), "at most 1e9, is 1e25"),
         (r#""restitution": 0.1"#, r#""restitution": 1.1"#, &format!("{shape}.restitution: "), "1.1"),
@@ -437,16 +425,16 @@ fn bad_files_are_refused_with_place_and_value() {
         (r#""radius": 0.5"#, r#""radius": 0"#, &format!("{shape}.circle: "), "0"),
         (r#""radius": 0.5"#, r#""radius": -0.5"#, &format!("{shape}.circle: "), "-0.5"),
         (r#""radius": 0.5"#, r#""radius": 1e39"#, &format!("{shape}.circle.radius: "), "1e39"),
-        (r#""radius": 0.5"#, "", &format!("{shape}.circle: "), "missing field `radius`"),
+        (r#""radius": 0.5"#, "", &format!("{shape}: "), "missing field `radius`"),
         (
             r#""segment": {"a": [-1, 0], "#,
             r#""segment": {"#,
-            "bodies[0].shapes[0].segment: ",
+            "bodies[0].shapes[0]: ",
             "missing field `a`",
         ),
-        (r#""radius": 0.5"#, r#""radius": 1, "r": 2"#, &format!("{shape}.circle.r: "), "unknown field `r`"),
-        (&format!("{disc}, "), "", &format!("{shape}: "), "0 geometries"),
-        (disc, &format!(r#"{disc}, "box": {{"half": [1, 1]}}"#), &format!("{shape}: "), "2 geometries"),
+        (r#""radius": 0.5"#, r#""radius": 1, "r": 2"#, &format!("{shape}: "), "unknown field `r`"),
+        (&format!("{disc}, "), "", &format!("{shape}: "), "no variant of enum Geometry"),
+        (disc, &format!(r#"{disc}, "box": {{"half": [1, 1]}}"#), &format!("{shape}: "), "unknown field `box`"),
         (disc, r#""box": {"half": [1, 0]}"#, &format!("{shape}.box: "), "0"),
         (disc, r#""box": {"half": [1, 1], "radius": -1}"#, &format!("{shape}.box: "), "-1"),
         (disc, r#""box": {"half": [1, 1], "angle": 1e50}"#, &format!("{shape}.box.angle: "), "1e50"),
@@ -482,7 +470,7 @@ fn bad_files_are_refused_with_place_and_value() {
             "bodies[1].shapes: ",
             "has 0",
         ),
-        ("\n]}", "\n]", "bodies: ", "line 4"),
+        ("\n]}", "\n]", "", "line 4"),
     ];
     for (from, to, place, value) in table {
         match read(&broken(from, to)) {
@@ -495,6 +483,30 @@ fn bad_files_are_refused_with_place_and_value() {
             }
         }
     }
+}
+
+/// Every key of the catalog's files is in the schema.
+#[test]
+fn the_schema_names_every_key() {
+    fn keys(value: &serde_json::Value, all: &mut std::collections::BTreeSet<String>) {
+        match value {
+            serde_json::Value::Object(map) => map.iter().for_each(|(key, value)| {
+                all.insert(key.clone());
+                keys(value, all);
+            }),
+            serde_json::Value::Array(list) => list.iter().for_each(|value| keys(value, all)),
+            _ => {}
+        }
+    }
+    let schema: serde_json::Value = serde_json::from_str(&schema()).unwrap();
+    let (mut known, mut used) = Default::default();
+    keys(&schema, &mut known);
+    for entry in CATALOG {
+        let size = entry.size.map_or(String::new(), |s| format!(":{}", s.min));
+        keys(&serde_json::from_str(&scene(&format!("{}{size}", entry.name)).to_json()).unwrap(), &mut used);
+    }
+    assert!(used.is_subset(&known) && used.len() > 40, "{:?}", used.difference(&known));
+    assert!(schema["additionalProperties"] == false && schema["properties"]["dt"]["default"].is_f64());
 }
 
 #[test]

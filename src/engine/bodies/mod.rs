@@ -13,6 +13,7 @@ pub use def::{BodyDef, MAX_FRICTION, ShapeDef};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum BodyKind {
     /// Never moves.
     Static,

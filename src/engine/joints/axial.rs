@@ -9,6 +9,7 @@ use crate::lanes::Lanes;
 /// A damped spring.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Spring {
     /// Natural frequency of the two bodies on the spring (Hz).
     pub hertz: f64,
@@ -22,6 +23,7 @@ pub struct Spring {
 /// A motor with a target speed and bounded torque or force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Motor {
     /// Target speed (rad/s or m/s).
     pub speed: f64,

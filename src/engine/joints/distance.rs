@@ -14,6 +14,7 @@ use crate::lanes::Lanes;
     derive(serde::Serialize, serde::Deserialize),
     serde(default, deny_unknown_fields)
 )]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Distance {
     /// Anchor in the frame of a (m).
     pub anchor_a: [f64; 2],
@@ -22,10 +23,13 @@ pub struct Distance {
     /// Length of the rod, or of the relaxed spring (m).
     pub length: f64,
     /// Spring along the line between the points.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub spring: Option<Spring>,
     /// Motor along the line between the points; a positive speed lengthens it.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub motor: Option<Motor>,
     /// Minimum and maximum distance (m); a rope has `[0, length]`.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub limits: Option<[f64; 2]>,
 }
 

@@ -15,6 +15,7 @@ use crate::lanes::Lanes;
     derive(serde::Serialize, serde::Deserialize),
     serde(default, deny_unknown_fields)
 )]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct MotorJoint {
     /// Target of b's anchor, in the frame of a (m).
     pub anchor_a: [f64; 2],

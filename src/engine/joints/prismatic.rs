@@ -16,6 +16,7 @@ use glam::DVec2;
     derive(serde::Serialize, serde::Deserialize),
     serde(default, deny_unknown_fields)
 )]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Prismatic {
     /// Anchor in the frame of a (m).
     pub anchor_a: [f64; 2],
@@ -26,10 +27,13 @@ pub struct Prismatic {
     /// Angle of b relative to a (rad).
     pub reference_angle: f64,
     /// Spring along the axis.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub spring: Option<Spring>,
     /// Motor along the axis.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub motor: Option<Motor>,
     /// Lower and upper limit of the displacement along the axis (m).
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub limits: Option<[f64; 2]>,
 }
 

@@ -15,6 +15,7 @@ use crate::lanes::Lanes;
     derive(serde::Serialize, serde::Deserialize),
     serde(default, deny_unknown_fields)
 )]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Revolute {
     /// Anchor in the frame of a (m).
     pub anchor_a: [f64; 2],
@@ -23,10 +24,13 @@ pub struct Revolute {
     /// Angle of b relative to a that counts as zero (rad).
     pub reference_angle: f64,
     /// Spring on the angle.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub spring: Option<Spring>,
     /// Motor on the angle.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub motor: Option<Motor>,
     /// Lower and upper limit of the angle (rad).
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub limits: Option<[f64; 2]>,
 }
 

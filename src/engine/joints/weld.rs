@@ -15,6 +15,7 @@ use crate::lanes::Lanes;
     derive(serde::Serialize, serde::Deserialize),
     serde(default, deny_unknown_fields)
 )]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Weld {
     /// Anchor in the frame of a (m).
     pub anchor_a: [f64; 2],
@@ -23,8 +24,10 @@ pub struct Weld {
     /// Angle of b relative to a (rad).
     pub reference_angle: f64,
     /// Spring between the anchors; `None` is rigid.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub linear: Option<Spring>,
     /// Spring on the angle; `None` is rigid.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub angular: Option<Spring>,
 }
 

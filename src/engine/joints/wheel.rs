@@ -16,6 +16,7 @@ use glam::DVec2;
     derive(serde::Serialize, serde::Deserialize),
     serde(default, deny_unknown_fields)
 )]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Wheel {
     /// Anchor in the frame of a (m).
     pub anchor_a: [f64; 2],
@@ -24,10 +25,13 @@ pub struct Wheel {
     /// Direction of the suspension in the frame of a, of any length.
     pub axis: [f64; 2],
     /// Spring of the suspension.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub spring: Option<Spring>,
     /// Motor that turns the wheel.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub motor: Option<Motor>,
     /// Lower and upper limit of the displacement along the axis (m).
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub limits: Option<[f64; 2]>,
 }
 

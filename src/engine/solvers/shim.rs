@@ -44,7 +44,7 @@ use crate::constraints::{ImpactLaw, Passes, Solver, Spreading};
 use crate::lanes::BodyRow;
 use crate::narrowphase::batch::PairKind;
 use crate::narrowphase::circles::Rolling;
-use crate::params::{Budget, Mechanism, Parameter, lines_of};
+use crate::params::{Budget, Mechanism, Parameter};
 use frames::Roll;
 use glam::Vec2;
 use jams::Jams;
@@ -120,87 +120,53 @@ const MECHANISMS: [Mechanism; 12] = [
         name: "statics",
         meaning: "springs are shortened by the sag of the loads that contacts bear at rest",
         case: "B24.bricks",
-        lines: lines_of(include_str!("shim/rest/mod.rs"))
-            + lines_of(include_str!("shim/rest/closed.rs"))
-            + lines_of(include_str!("shim/rest/loads.rs"))
-            + lines_of(include_str!("shim/rest/shorten.rs")),
     },
-    Mechanism {
-        name: "hand_down",
-        meaning: "loads go down from body to body",
-        case: "B5.height",
-        lines: lines_of(include_str!("shim/rest/hand_down.rs"))
-            + lines_of(include_str!("../constraints/numerics/supports.rs")),
-    },
+    Mechanism { name: "hand_down", meaning: "loads go down from body to body", case: "B5.height" },
     Mechanism {
         name: "rising",
         meaning: "springs are shortened for more load only where nothing moves, within 3 s",
-        case: "torture ratios restless",
-        lines: 0,
+        case: "random ratios restless",
     },
     Mechanism {
         name: "bearing",
         meaning: "springs bear a load however deep their contact is",
         case: "B19.share",
-        lines: 0,
     },
     Mechanism {
         name: "frames",
         meaning: "what rolls has the frame of the middle of the step",
         case: "A26.plank",
-        lines: lines_of(include_str!("shim/frames.rs")),
     },
     Mechanism {
         name: "impacts",
         meaning: "what comes in bounces or stops before the step",
         case: "A17.billiards",
-        lines: lines_of(include_str!("../constraints/impacts/spread/mod.rs"))
-            + lines_of(include_str!("../constraints/impacts/spread/find.rs"))
-            + lines_of(include_str!("../constraints/impacts/spread/law.rs"))
-            + lines_of(include_str!("../constraints/impacts/spread/pair.rs"))
-            + lines_of(include_str!("../constraints/impacts/spread/point.rs"))
-            + lines_of(include_str!("../constraints/impacts/touch.rs")),
     },
-    Mechanism {
-        name: "moment",
-        meaning: "impacts happen at their time in the step",
-        case: "A27.oblique",
-        lines: 0,
-    },
+    Mechanism { name: "moment", meaning: "impacts happen at their time in the step", case: "A27.oblique" },
     Mechanism {
         name: "release",
         meaning: "points that an impact releases have borne their body until then",
         case: "A26.block",
-        lines: 0,
     },
     Mechanism {
         name: "jams",
         meaning: "what is caught or squeezed begins a step without impulses, within the speed that squeezes it",
-        case: "torture driven energy",
-        lines: lines_of(include_str!("shim/jams.rs")),
+        case: "random driven energy",
     },
     Mechanism {
         name: "once",
         meaning: "contacts of one point are shortened once, as soon as nothing moves",
         case: "rest::a_pile_of_discs_hardly_breathes",
-        lines: 0,
     },
     Mechanism {
         name: "chains",
         meaning: "chains of joints that hang from what does not move are solved at once",
         case: "B17.ratio",
-        lines: lines_of(include_str!("../constraints/joints/chains/mod.rs"))
-            + lines_of(include_str!("../constraints/joints/chains/records.rs"))
-            + lines_of(include_str!("../constraints/joints/chains/system.rs"))
-            + lines_of(include_str!("../constraints/joints/chains/system/apparent.rs"))
-            + lines_of(include_str!("../constraints/joints/chains/system/blocks.rs"))
-            + lines_of(include_str!("../constraints/records/links.rs")),
     },
     Mechanism {
         name: "unequal",
         meaning: "contacts between bodies of unequal masses are damped more and over-relaxed",
-        case: "torture ratios restless",
-        lines: 0,
+        case: "random ratios restless",
     },
 ];
 

@@ -6,13 +6,11 @@
 
 use super::expect::Expect;
 use super::joints::SceneJoint;
-use super::place::place_at;
 use crate::engine::bodies::BodyKind;
 use crate::engine::params::{DEFAULT_DENSITY, DEFAULT_DT, DEFAULT_FRICTION, DEFAULT_GRAVITY};
 use crate::lab::error::Error;
-use serde::de::{MapAccess, Visitor, value::MapAccessDeserializer};
-use serde::{Deserialize, Deserializer, Serialize};
-use std::fmt;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Default number of steps: five seconds at the default step.
@@ -36,8 +34,9 @@ pub const DEFAULT_STEPS: u32 = 300;
 /// world.step()?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(title = "simpulse scene")]
 pub struct Scene {
     /// Name in tables; not empty.
     pub name: String,
@@ -65,7 +64,7 @@ pub struct Scene {
 }
 
 /// One body of a scene.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SceneBody {
     /// How it moves.
@@ -102,21 +101,26 @@ pub struct SceneBody {
 }
 
 /// A shape with its surface. In a file, an object with one geometry key beside the three numbers.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(into = "ShapeObject")]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct SceneShape {
     /// Geometry in the frame of the body (m).
+    #[serde(flatten)]
     pub geometry: Geometry,
     /// Density (kg/m²), > 0.
+    #[serde(default = "default_density", skip_serializing_if = "is_default_density")]
     pub density: f64,
     /// Coulomb coefficient, ≥ 0 and ≤ 10⁹; two surfaces mix as √(µa µb).
+    #[serde(default = "default_friction", skip_serializing_if = "is_default_friction")]
     pub friction: f64,
     /// Restitution, in [0, 1]; two surfaces mix as max(ea, eb).
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub restitution: f64,
 }
 
 /// The area that a shape covers (m, rad).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum Geometry {
     /// `{"circle": …}`
     Circle(Circle),
@@ -131,7 +135,7 @@ pub enum Geometry {
 }
 
 /// All points within `radius` of `center`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Circle {
     /// m
@@ -142,7 +146,7 @@ pub struct Circle {
 }
 
 /// A rectangle turned about its center, grown by `radius`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rectangle {
     /// Half width and half height (m), > 0.
@@ -159,7 +163,7 @@ pub struct Rectangle {
 }
 
 /// A convex polygon of 3 to 8 vertices, grown by `radius`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PolygonGeometry {
     /// Vertices in either winding (m).
@@ -170,7 +174,7 @@ pub struct PolygonGeometry {
 }
 
 /// All points within `radius` of the segment a–b.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Capsule {
     /// m
@@ -182,7 +186,7 @@ pub struct Capsule {
 }
 
 /// A massless two-sided line.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SegmentGeometry {
     /// m
@@ -191,108 +195,16 @@ pub struct SegmentGeometry {
     pub b: [f64; 2],
 }
 
-/// A shape in a file. Serde cannot reject unknown keys of a flattened enum, so every geometry is an optional
-/// key, and exactly one must be present.
-#[derive(Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ShapeObject {
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    circle: Option<Circle>,
-    #[serde(default, rename = "box", skip_serializing_if = "Option::is_none")]
-    rectangle: Option<Rectangle>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    polygon: Option<PolygonGeometry>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    capsule: Option<Capsule>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    segment: Option<SegmentGeometry>,
-    #[serde(default = "default_density", skip_serializing_if = "is_default_density")]
-    density: f64,
-    #[serde(default = "default_friction", skip_serializing_if = "is_default_friction")]
-    friction: f64,
-    #[serde(default, skip_serializing_if = "is_zero")]
-    restitution: f64,
-}
-
-impl TryFrom<ShapeObject> for SceneShape {
-    type Error = String;
-
-    fn try_from(object: ShapeObject) -> Result<Self, String> {
-        let ShapeObject { circle, rectangle, polygon, capsule, segment, density, friction, restitution } =
-            object;
-        let given: Vec<Geometry> = [
-            circle.map(Geometry::Circle),
-            rectangle.map(Geometry::Box),
-            polygon.map(Geometry::Polygon),
-            capsule.map(Geometry::Capsule),
-            segment.map(Geometry::Segment),
-        ]
-        .into_iter()
-        .flatten()
-        .collect();
-        let count = given.len();
-        match <[Geometry; 1]>::try_from(given) {
-            Ok([geometry]) => Ok(SceneShape { geometry, density, friction, restitution }),
-            Err(_) => Err(format!(
-                "a shape with {count} geometries, where exactly one of circle, box, polygon, capsule, segment is needed"
-            )),
-        }
-    }
-}
-
-/// Not `serde(try_from)`, which would report a wrong number of geometries after the whole list of shapes;
-/// from inside the map it is reported at the shape.
-impl<'de> Deserialize<'de> for SceneShape {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct ShapeVisitor;
-        impl<'de> Visitor<'de> for ShapeVisitor {
-            type Value = SceneShape;
-
-            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-                f.write_str("a shape")
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<SceneShape, A::Error> {
-                let object = ShapeObject::deserialize(MapAccessDeserializer::new(map))?;
-                object.try_into().map_err(serde::de::Error::custom)
-            }
-        }
-        deserializer.deserialize_map(ShapeVisitor)
-    }
-}
-
-impl From<SceneShape> for ShapeObject {
-    fn from(shape: SceneShape) -> Self {
-        let SceneShape { geometry, density, friction, restitution } = shape;
-        let mut object = ShapeObject { density, friction, restitution, ..Default::default() };
-        match geometry {
-            Geometry::Circle(circle) => object.circle = Some(circle),
-            Geometry::Box(rectangle) => object.rectangle = Some(rectangle),
-            Geometry::Polygon(polygon) => object.polygon = Some(polygon),
-            Geometry::Capsule(capsule) => object.capsule = Some(capsule),
-            Geometry::Segment(segment) => object.segment = Some(segment),
-        }
-        object
-    }
-}
-
 impl Scene {
     /// Reads a scene; `path` only names the text in errors.
     ///
-    /// Errors: text that is not JSON of this form, with line, column and place; a value out of range
+    /// Errors: text that is not JSON of this form, with place, line and column; a value out of range
     /// ([`Scene::validate`]), with its place.
     pub fn from_json(text: &str, path: &Path) -> Result<Self, Error> {
         let failed = |message| Error::Format { path: path.to_path_buf(), message };
-        // Derived code would accept a list of values in the order of the fields.
-        if let Some(at) = text.find(|c: char| !c.is_whitespace())
-            && text[at..].starts_with('[')
-        {
-            let line = text[..at].matches('\n').count() + 1;
-            let column = at - text[..at].rfind('\n').map_or(0, |end| end + 1) + 1;
-            let message = format!("a scene is an object, {{…}}, not a list, at line {line} column {column}");
-            return Err(failed(message));
-        }
-        let scene: Scene = serde_json::from_str(text).map_err(|e| failed(place_at(text, &e)))?;
+        let mut reader = serde_json::Deserializer::from_str(text);
+        let scene: Scene = serde_path_to_error::deserialize(&mut reader).map_err(|e| failed(at_place(text, &e)))?;
+        reader.end().map_err(|e| failed(e.to_string()))?;
         scene.validate().map_err(|e| failed(e.to_string()))?;
         Ok(scene)
     }
@@ -308,28 +220,41 @@ impl Scene {
     /// becomes `null`, which reading rejects.
     pub fn to_json(&self) -> String {
         // Infallible: every map key is a string and nothing here can fail to serialize.
-        let line = |value: serde_json::Result<String>| value.unwrap_or_default();
-        let bodies: Vec<String> = self.bodies.iter().map(|b| line(serde_json::to_string(b))).collect();
-        let joints: Vec<String> = self.joints.iter().map(|j| line(serde_json::to_string(j))).collect();
-        let joints = if joints.is_empty() {
-            String::new()
-        } else {
-            format!(", \"joints\": [\n{}\n]", joints.join(",\n"))
-        };
-        let unit = line(serde_json::to_string(&self.length_unit));
-        let unit =
-            if is_one(&self.length_unit) { String::new() } else { format!("\"length_unit\": {unit}, ") };
-        let expect = self.expect.as_ref().map(|e| line(serde_json::to_string(e)));
-        let expect = expect.map_or(String::new(), |text| format!("\"expect\": {text}, "));
-        format!(
-            "{{\"name\": {}, \"gravity\": {}, \"dt\": {}, \"steps\": {}, {unit}{expect}\"bodies\": [\n{}\n]{joints}}}\n",
-            line(serde_json::to_string(&self.name)),
-            line(serde_json::to_string(&self.gravity)),
-            line(serde_json::to_string(&self.dt)),
-            self.steps,
-            bodies.join(",\n")
-        )
+        fn line(value: &impl Serialize) -> String {
+            serde_json::to_string(value).unwrap_or_default()
+        }
+        fn lines<T: Serialize>(key: &str, list: &[T]) -> String {
+            format!(", \"{key}\": [\n{}\n]", list.iter().map(line).collect::<Vec<_>>().join(",\n"))
+        }
+        let head = Scene { bodies: Vec::new(), joints: Vec::new(), ..self.clone() };
+        let head = line(&head).replace(",\"bodies\":[]}", "");
+        let joints = if self.joints.is_empty() { String::new() } else { lines("joints", &self.joints) };
+        format!("{head}{}{joints}}}\n", lines("bodies", &self.bodies))
     }
+}
+
+/// JSON schema of scene files (2020-12). Ranges are checked by reading only.
+pub fn schema() -> String {
+    format!("{:#}\n", schemars::schema_for!(Scene).as_value())
+}
+
+/// Longest place that a message repeats (characters), to leave room for the message.
+const LONGEST_PLACE: usize = 120;
+
+/// The place of an error and the error, with the number if that is out of range.
+fn at_place(text: &str, error: &serde_path_to_error::Error<serde_json::Error>) -> String {
+    let inner = error.inner();
+    let mut message = inner.to_string();
+    if message.starts_with("number out of range") {
+        let before = text.lines().nth(inner.line().saturating_sub(1)).and_then(|l| l.get(..inner.column()));
+        let number = |c: char| c.is_ascii_alphanumeric() || "+-.".contains(c);
+        let end = before.unwrap_or_default().trim_end_matches(|c| !number(c));
+        message += &format!(" ({})", &end[end.trim_end_matches(number).len()..]);
+    }
+    let place: String = error.path().to_string();
+    let cut: String = place.chars().take(LONGEST_PLACE).collect();
+    let more = if cut.len() < place.len() { "…" } else { "" };
+    if [".", "?"].contains(&place.as_str()) { message } else { format!("{cut}{more}: {message}") }
 }
 
 fn default_gravity() -> [f64; 2] {

@@ -1,14 +1,12 @@
 //! Joints of scenes: `{"revolute": {"a": 3, "b": 4, "anchor_a": [0.5, 0], "limits": [-1, 1]}}`.
 
 use crate::engine::joints::{Distance, JointKind, MotorJoint, Mouse, Prismatic, Revolute, Weld, Wheel};
-use serde::de::{DeserializeOwned, MapAccess, Visitor};
-use serde::ser::SerializeMap;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use serde_json::{Map, Value};
-use std::fmt;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// A joint of a scene. In a file, an object whose one key is the kind.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(from = "JointObject", into = "JointObject")]
 pub struct SceneJoint {
     /// Index of body a.
     pub a: usize,
@@ -21,9 +19,6 @@ pub struct SceneJoint {
     /// Type of the joint, with its values.
     pub kind: JointKind,
 }
-
-/// Names of the kinds in files.
-const KINDS: [&str; 8] = ["revolute", "prismatic", "distance", "weld", "wheel", "motor", "mouse", "filter"];
 
 impl SceneJoint {
     /// A joint between the bodies with these indices, which do not collide with each other.
@@ -45,108 +40,83 @@ impl SceneJoint {
         }
         self
     }
+}
 
-    fn read(kind: &str, mut object: Map<String, Value>) -> Result<Self, String> {
-        fn take<T: DeserializeOwned>(
-            object: &mut Map<String, Value>,
-            key: &str,
-        ) -> Result<Option<T>, String> {
-            let Some(value) = object.remove(key) else { return Ok(None) };
-            serde_json::from_value(value).map(Some).map_err(|e| format!("{key}: {e}"))
-        }
-        fn rest<T: DeserializeOwned>(object: Map<String, Value>) -> Result<T, String> {
-            serde_json::from_value(Value::Object(object)).map_err(|e| e.to_string())
-        }
-        let body = |object: &mut Map<String, Value>, key: &str| {
-            take(object, key)?.ok_or_else(|| format!("missing field `{key}`, the index of a body"))
-        };
-        let (a, b) = (body(&mut object, "a")?, body(&mut object, "b")?);
-        let collide_connected = take(&mut object, "collide_connected")?.unwrap_or(false);
-        let break_load = take(&mut object, "break_load")?;
-        if let Some((key, _)) = object.iter().find(|(_, value)| value.is_null()) {
-            return Err(format!("{key}: null is no value: leave it out"));
-        }
-        let parts = ["spring", "motor", "linear", "angular"].into_iter();
-        for (key, value) in parts.filter_map(|key| Some((key, object.get(key)?))) {
-            if !value.is_object() {
-                return Err(format!("{key}: must be an object, is {value}"));
-            }
-        }
-        let kind = match kind {
-            "revolute" => JointKind::Revolute(rest::<Revolute>(object)?),
-            "prismatic" => JointKind::Prismatic(rest::<Prismatic>(object)?),
-            "distance" => JointKind::Distance(rest::<Distance>(object)?),
-            "weld" => JointKind::Weld(rest::<Weld>(object)?),
-            "wheel" => JointKind::Wheel(rest::<Wheel>(object)?),
-            "motor" => JointKind::Motor(rest::<MotorJoint>(object)?),
-            "mouse" => JointKind::Mouse(rest::<Mouse>(object)?),
-            "filter" => match object.keys().next() {
-                None => JointKind::Filter,
-                Some(key) => return Err(format!("unknown field `{key}`: a filter has bodies only")),
-            },
-            _ => return Err(format!("unknown kind `{kind}`: one of {}", KINDS.join(", "))),
-        };
-        Ok(SceneJoint { a, b, collide_connected, break_load, kind })
-    }
+/// A joint in a file: an object whose one key is the kind.
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+enum JointObject {
+    Revolute(Ends<Revolute>),
+    Prismatic(Ends<Prismatic>),
+    Distance(Ends<Distance>),
+    Weld(Ends<Weld>),
+    Wheel(Ends<Wheel>),
+    Motor(Ends<MotorJoint>),
+    Mouse(Ends<Mouse>),
+    Filter(Ends<Nothing>),
+}
 
-    fn write(&self) -> serde_json::Result<Map<String, Value>> {
-        let mut object = Map::new();
-        object.insert("a".into(), self.a.into());
-        object.insert("b".into(), self.b.into());
-        if self.collide_connected {
-            object.insert("collide_connected".into(), true.into());
-        }
-        if let Some(load) = self.break_load {
-            object.insert("break_load".into(), serde_json::to_value(load)?);
-        }
-        let of_kind = match &self.kind {
-            JointKind::Revolute(joint) => serde_json::to_value(joint)?,
-            JointKind::Prismatic(joint) => serde_json::to_value(joint)?,
-            JointKind::Distance(joint) => serde_json::to_value(joint)?,
-            JointKind::Weld(joint) => serde_json::to_value(joint)?,
-            JointKind::Wheel(joint) => serde_json::to_value(joint)?,
-            JointKind::Motor(joint) => serde_json::to_value(joint)?,
-            JointKind::Mouse(joint) => serde_json::to_value(joint)?,
-            JointKind::Filter => Value::Object(Map::new()),
-        };
-        let Value::Object(of_kind) = of_kind else { return Ok(object) };
-        object.extend(of_kind.into_iter().filter(|(_, value)| !value.is_null()));
-        Ok(object)
+/// The bodies of a joint and what all kinds have, beside the values of its kind.
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Ends<T> {
+    /// Index of body a, in whose frame axes are.
+    a: usize,
+    /// Index of body b.
+    b: usize,
+    /// Whether the two bodies collide with each other.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    collide_connected: bool,
+    /// Force (N) and torque (N·m) above which the joint counts as broken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    break_load: Option<[f64; 2]>,
+    #[serde(flatten)]
+    of_kind: T,
+}
+
+/// A joint without values of its own.
+#[derive(Serialize, Deserialize, JsonSchema)]
+struct Nothing {}
+
+impl<T> Ends<T> {
+    fn joint(self, kind: impl Fn(T) -> JointKind) -> SceneJoint {
+        let Ends { a, b, collide_connected, break_load, of_kind } = self;
+        SceneJoint { a, b, collide_connected, break_load, kind: kind(of_kind) }
     }
 }
 
-impl Serialize for SceneJoint {
-    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        let mut map = to.serialize_map(Some(1))?;
-        map.serialize_entry(self.kind.name(), &self.write().map_err(serde::ser::Error::custom)?)?;
-        map.end()
+impl From<JointObject> for SceneJoint {
+    fn from(object: JointObject) -> Self {
+        match object {
+            JointObject::Revolute(ends) => ends.joint(JointKind::Revolute),
+            JointObject::Prismatic(ends) => ends.joint(JointKind::Prismatic),
+            JointObject::Distance(ends) => ends.joint(JointKind::Distance),
+            JointObject::Weld(ends) => ends.joint(JointKind::Weld),
+            JointObject::Wheel(ends) => ends.joint(JointKind::Wheel),
+            JointObject::Motor(ends) => ends.joint(JointKind::Motor),
+            JointObject::Mouse(ends) => ends.joint(JointKind::Mouse),
+            JointObject::Filter(ends) => ends.joint(|_| JointKind::Filter),
+        }
     }
 }
 
-impl<'de> Deserialize<'de> for SceneJoint {
-    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        struct JointVisitor;
-        impl<'de> Visitor<'de> for JointVisitor {
-            type Value = SceneJoint;
-
-            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-                f.write_str("a joint, {\"revolute\": {\"a\": 0, \"b\": 1, …}}")
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<SceneJoint, A::Error> {
-                use serde::de::Error;
-                let Some((kind, object)) = map.next_entry::<String, Map<String, Value>>()? else {
-                    return Err(A::Error::custom(format!(
-                        "a joint without a kind: one of {}",
-                        KINDS.join(", ")
-                    )));
-                };
-                if let Some(other) = map.next_key::<String>()? {
-                    return Err(A::Error::custom(format!("a joint of two kinds, `{kind}` and `{other}`")));
-                }
-                SceneJoint::read(&kind, object).map_err(|e| A::Error::custom(format!("{kind}: {e}")))
-            }
+impl From<SceneJoint> for JointObject {
+    fn from(joint: SceneJoint) -> Self {
+        let SceneJoint { a, b, collide_connected, break_load, kind } = joint;
+        macro_rules! ends {
+            ($of_kind:expr) => {
+                Ends { a, b, collide_connected, break_load, of_kind: $of_kind }
+            };
         }
-        from.deserialize_map(JointVisitor)
+        match kind {
+            JointKind::Revolute(joint) => JointObject::Revolute(ends!(joint)),
+            JointKind::Prismatic(joint) => JointObject::Prismatic(ends!(joint)),
+            JointKind::Distance(joint) => JointObject::Distance(ends!(joint)),
+            JointKind::Weld(joint) => JointObject::Weld(ends!(joint)),
+            JointKind::Wheel(joint) => JointObject::Wheel(ends!(joint)),
+            JointKind::Motor(joint) => JointObject::Motor(ends!(joint)),
+            JointKind::Mouse(joint) => JointObject::Mouse(ends!(joint)),
+            JointKind::Filter => JointObject::Filter(ends!(Nothing {})),
+        }
     }
 }

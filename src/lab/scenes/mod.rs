@@ -14,7 +14,6 @@ mod column;
 mod compounds;
 mod dominoes;
 pub mod expect;
-mod expected;
 mod far;
 mod format;
 mod free;
@@ -29,7 +28,6 @@ mod mass_ratio;
 mod overlap;
 mod parts;
 mod pendulums;
-mod place;
 mod pyramid;
 mod ragdolls;
 mod single_box;
@@ -40,15 +38,12 @@ mod truth;
 mod tumbler;
 mod washer;
 
-/// JSON schema of scene files (2020-12).
-pub const SCHEMA: &str = include_str!("scene.schema.json");
-
 pub use check::{LENGTH_UNITS, MAX_BODIES, MAX_DT, MAX_FRICTION, MAX_STEPS, MIN_DT};
 pub use expect::Measure;
-pub use expected::loaded as expecting;
+pub use expect::loaded as expecting;
 pub use format::{
     Capsule, Circle, DEFAULT_STEPS, Geometry, PolygonGeometry, Rectangle, Scene, SceneBody, SceneShape,
-    SegmentGeometry,
+    SegmentGeometry, schema,
 };
 pub use joints::SceneJoint;
 pub use truth::{Observer, Truth};

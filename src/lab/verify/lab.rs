@@ -1,14 +1,22 @@
 //! Shared tools of the cases: worlds for one solver, and measurements of their state in `f64`.
 
-use super::{Failure, Finding, ParameterSweep, SweepRow};
-use crate::engine::bodies::BodyKind;
+pub(super) use super::{Case, Failure, Finding};
+pub(super) use crate::engine::bodies::BodyKind;
+pub(super) use crate::engine::contacts::Contact;
+pub(super) use crate::engine::world::World;
+pub(super) use crate::lab::scenes::{Geometry, Scene, SceneBody, SceneJoint, SceneShape};
+pub(super) use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, FRAC_PI_4, PI, TAU};
+
+use super::{ParameterSweep, SweepRow};
 use crate::engine::constraints::Impacts;
-use crate::engine::contacts::Contact;
 use crate::engine::params::{CONTACT_HERTZ, DEFAULT_GRAVITY, LINEAR_SLOP, Without};
 use crate::engine::solvers::Variant;
-use crate::engine::world::{Settings, World};
-use crate::lab::scenes::{self, Scene, SceneBody, SceneShape};
-use std::f64::consts::TAU;
+use crate::engine::world::Settings;
+use crate::lab::scenes;
+use std::ops::Range;
+
+/// What a case measures.
+pub(super) type Measured = Result<Finding, Failure>;
 
 /// Gravity of every case that uses it (m/s²).
 pub(super) const G: f64 = -DEFAULT_GRAVITY[1];
@@ -79,9 +87,31 @@ impl Lab {
         Ok(world)
     }
 
+    /// Runs `scene` for `seconds` and reads the finding from its last state.
+    pub(super) fn after(&self, scene: Scene, seconds: f64, read: impl FnOnce(&World) -> Finding) -> Measured {
+        Ok(read(&self.run(scene, seconds, |_| ())?))
+    }
+
+    /// The largest `value` of the steps in `window` (s), which should be 0.
+    pub(super) fn most(
+        &self,
+        scene: Scene,
+        window: Range<f64>,
+        tolerance: f64,
+        mut value: impl FnMut(&World) -> f64,
+    ) -> Measured {
+        let mut most = 0.0;
+        self.run(scene, window.end, |world| {
+            if time(world) > window.start {
+                most = largest([most, value(world)]);
+            }
+        })?;
+        Ok(Finding::new(most, 0.0, tolerance))
+    }
+
     /// Runs a scene of the catalog over its full length. The measured value is the error that the observer of
     /// its reference value reports.
-    pub(super) fn catalog(&self, name: &str, tolerance: f64) -> Result<Finding, Failure> {
+    pub(super) fn catalog(&self, name: &str, tolerance: f64) -> Measured {
         let loaded = scenes::load(name)?;
         let mut truth =
             loaded.truth.ok_or_else(|| Failure::Unmeasured(format!("{name} has no reference value")))?;
@@ -135,6 +165,17 @@ pub(super) fn center(world: &World, i: usize) -> [f64; 2] {
     world.bodies.center(i)
 }
 
+/// Centers of mass of all bodies (m).
+pub(super) fn places(world: &World) -> Vec<[f64; 2]> {
+    (0..world.bodies.len()).map(|i| center(world, i)).collect()
+}
+
+/// Greatest distance of a body from its place (m).
+pub(super) fn largest_distance(world: &World, places: &[[f64; 2]]) -> f64 {
+    let now = (0..world.bodies.len()).map(|i| center(world, i));
+    largest(places.iter().zip(now).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])))
+}
+
 /// Velocity of body `i` (m/s).
 pub(super) fn velocity(world: &World, i: usize) -> [f64; 2] {
     [f64::from(world.bodies.velocity_x[i]), f64::from(world.bodies.velocity_y[i])]
@@ -143,6 +184,17 @@ pub(super) fn velocity(world: &World, i: usize) -> [f64; 2] {
 /// Angular velocity of body `i` (rad/s).
 pub(super) fn spin(world: &World, i: usize) -> f64 {
     f64::from(world.bodies.angular_velocity[i])
+}
+
+/// Velocity (m/s) and angular velocity (rad/s) of body `i`.
+pub(super) fn motion(world: &World, i: usize) -> [f64; 3] {
+    let [x, y] = velocity(world, i);
+    [x, y, spin(world, i)]
+}
+
+/// Angle of body `i` within half a turn (rad).
+pub(super) fn angle(world: &World, i: usize) -> f64 {
+    f64::from(world.bodies.rotation_sin[i]).atan2(f64::from(world.bodies.rotation_cos[i]))
 }
 
 /// Component along a slope that descends to the right at `angle` (rad), positive downhill.
@@ -253,9 +305,34 @@ pub(super) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, |m, v| if v.is_nan() { f64::INFINITY } else { m.max(v) })
 }
 
-/// The finding with the larger measured value.
-pub(super) fn worse(a: Finding, b: Finding) -> Finding {
-    if a.measured > b.measured { a } else { b }
+/// The value of the parameter at which it is farthest from `truth`, with its note.
+pub(super) fn worst_of<P>(
+    parameters: impl IntoIterator<Item = P>,
+    truth: f64,
+    tolerance: f64,
+    mut value: impl FnMut(P) -> Result<(f64, String), Failure>,
+) -> Measured {
+    let mut worst = Finding::new(truth, truth, tolerance);
+    for parameter in parameters {
+        let (measured, note) = value(parameter)?;
+        let found = Finding::new(measured, truth, tolerance).note(note);
+        worst = if found.error() > worst.error() { found } else { worst };
+    }
+    Ok(worst)
+}
+
+/// The largest value over the parameters, which should be 0.
+pub(super) fn largest_of<P>(
+    parameters: impl IntoIterator<Item = P>,
+    tolerance: f64,
+    mut value: impl FnMut(P) -> Result<f64, Failure>,
+) -> Measured {
+    worst_of(parameters, 0.0, tolerance, |parameter| Ok((value(parameter)?, String::new())))
+}
+
+/// All pairs of two lists.
+pub(super) fn pairs<A: Copy, B: Copy>(a: &[A], b: &[B]) -> impl Iterator<Item = (A, B)> {
+    a.iter().flat_map(|&a| b.iter().map(move |&b| (a, b)))
 }
 
 /// Impulses [T, N] of an impact (N·s). Newton's law with `e` gives v_n⁺ = −e v_n. Coulomb's law with `mu`
@@ -305,6 +382,16 @@ pub(super) fn bisect(
     Ok(0.5 * (low + high))
 }
 
+/// The threshold within `range` at which `above` changes, over its reference value.
+pub(super) fn threshold(
+    range: Range<f64>,
+    truth: f64,
+    tolerance: f64,
+    above: impl FnMut(f64) -> Result<bool, Failure>,
+) -> Measured {
+    Ok(Finding::new(bisect(range.start, range.end, above)?, truth, tolerance))
+}
+
 /// Tries the values of a parameter in order. The measured value is the last one before the first failure (0
 /// if the first value fails); the reference value is the last of all. `hold` returns a number for the table
 /// and whether it is good enough. A diverged run counts as a failure.
@@ -312,7 +399,7 @@ pub(super) fn sweep(
     parameter: &'static str,
     values: &[f64],
     mut hold: impl FnMut(f64) -> Result<(f64, bool), Failure>,
-) -> Result<Finding, Failure> {
+) -> Measured {
     let mut rows = Vec::new();
     for &value in values {
         let (measured, holds) = match hold(value) {
@@ -329,6 +416,32 @@ pub(super) fn sweep(
 /// Ground at height 0 with the given friction: a line of half length `half` (m).
 pub(super) fn ground(half: f64, friction: f64) -> SceneBody {
     SceneBody::fixed([0.0, 0.0], SceneShape::line(half).friction(friction))
+}
+
+/// A kinematic slab with its upper face at height 0.
+pub(super) fn slab(half: f64, friction: f64) -> SceneBody {
+    SceneBody::new(BodyKind::Kinematic, [0.0, -0.5], SceneShape::rectangle(half, 0.5).friction(friction))
+}
+
+/// A fixed point to hang joints on: a small disc that touches nothing of its group.
+pub(super) fn pin() -> SceneBody {
+    SceneBody { group: -1, ..SceneBody::fixed([0.0, 0.0], SceneShape::disc(0.05)) }
+}
+
+/// A dynamic square of side 1 with its center at (x, y).
+pub(super) fn square(x: f64, y: f64) -> SceneBody {
+    SceneBody::dynamic([x, y], SceneShape::rectangle(0.5, 0.5))
+}
+
+/// A column of `count` rectangles on the ground, with gaps of `gap` (m) between them.
+pub(super) fn column(count: u32, [x, y]: [f64; 2], gap: f64) -> impl Iterator<Item = SceneBody> {
+    let at = move |i| [0.0, y + f64::from(i) * (2.0 * y + gap)];
+    (0..count).map(move |i| SceneBody::dynamic(at(i), SceneShape::rectangle(x, y)))
+}
+
+/// `first` and all of `others`.
+pub(super) fn with(first: SceneBody, others: impl IntoIterator<Item = SceneBody>) -> Vec<SceneBody> {
+    std::iter::once(first).chain(others).collect()
 }
 
 /// `shape` on a long plank that descends to the right at `angle` (rad). The shape starts in contact, its

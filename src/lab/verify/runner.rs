@@ -1,7 +1,6 @@
 //! Runs cases × solvers on several threads.
 
-use super::table::CASES;
-use super::{Case, Failure, Finding, Lab};
+use super::{CASES, Case, Failure, Finding, Lab};
 use crate::engine::solvers::Variant;
 use crate::lab::error::Error;
 use std::sync::Mutex;
