@@ -8,13 +8,10 @@ use super::compare::CompareArgs;
 use super::converge::ConvergeArgs;
 use super::growth::GrowthArgs;
 use super::merge::MergeArgs;
-use super::papers::PapersArgs;
 use super::profile::ProfileArgs;
-use super::replay::ReplayArgs;
 use super::report::ReportArgs;
 use super::run::RunArgs;
 use super::savings::SavingsArgs;
-use super::snapshot::SnapshotArgs;
 use super::study::{EXAMPLES as STUDY_EXAMPLES, StudyArgs};
 use super::torture::TortureArgs;
 use super::values;
@@ -63,8 +60,6 @@ pub enum Command {
     Compare(CompareArgs),
     Merge(MergeArgs),
     Run(RunArgs),
-    Snapshot(SnapshotArgs),
-    Replay(ReplayArgs),
     Report(ReportArgs),
     Advise(AdviseArgs),
     Capture(CaptureArgs),
@@ -76,7 +71,6 @@ pub enum Command {
     Profile(ProfileArgs),
     Growth(GrowthArgs),
     Savings(SavingsArgs),
-    Papers(PapersArgs),
     /// List the scenes
     Scenes(ListArgs),
     /// List the solvers
