@@ -16,7 +16,7 @@ mod mutate;
 
 use mutate::Random;
 use proptest::collection::vec;
-use proptest::prelude::{Just, Strategy, any};
+use proptest::prelude::{Strategy, any};
 use proptest::sample::Index;
 use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
 use rand::SeedableRng;
@@ -40,17 +40,17 @@ fn run(
     change: fn(&mut Random, &mut Vec<u8>, &[Vec<u8>]),
     judge: fn(&[u8], u64) -> Result<bool, String>,
 ) {
-    let number = |name| std::env::var(name).ok().map(|text| text.parse::<u64>().expect("a whole number"));
-    let seconds = number("SIMPULSE_FUZZ_SECONDS").map(Duration::from_secs);
+    let given = |name| std::env::var(name).ok().map(|text| text.parse::<u64>().expect("a whole number"));
+    let seconds = given("SIMPULSE_FUZZ_SECONDS").map(Duration::from_secs);
     let mut seed = [0; 32];
-    seed[..8].copy_from_slice(&number("SIMPULSE_FUZZ_SEED").unwrap_or(1).to_le_bytes());
+    seed[..8].copy_from_slice(&given("SIMPULSE_FUZZ_SEED").unwrap_or(1).to_le_bytes());
     let rng = TestRng::from_seed(RngAlgorithm::ChaCha, &seed);
     let config =
         Config { cases: inputs, failure_persistence: None, max_shrink_iters: 3000, ..Config::default() };
     let mut runner = TestRunner::new_with_rng(config, rng);
     // Fewer changes are simpler; another random number is not.
-    let numbers = any::<u64>().prop_flat_map(Just).no_shrink();
-    let strategy = (any::<Index>(), any::<u64>().no_shrink(), vec(numbers, 0..=6));
+    let number = || any::<u64>().no_shrink();
+    let strategy = (any::<Index>(), number(), vec(number(), 0..=6));
     let input = |at: &Index, changes: &[u64]| {
         let mut text = at.get(seeds).clone();
         changes.iter().for_each(|&c| change(&mut Random::seed_from_u64(c), &mut text, seeds));
@@ -67,14 +67,17 @@ fn run(
             let slow = || TestCaseError::fail(format!("took {:?}", begun.elapsed()));
             if begun.elapsed() < LONGEST { Ok(()) } else { Err(slow()) }
         });
-        if let Err(TestError::Fail(reason, (at, salt, changes))) = result {
-            let text = input(&at, &changes);
-            let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("fuzz-{name}.input"));
-            std::fs::write(&path, &text).expect("the target folder can be written");
-            let shown = String::from_utf8_lossy(&text[..text.len().min(400)]).into_owned();
-            panic!("{name}: {reason}\n  salt {salt}: {}\n  {shown:?}", path.display());
+        match result {
+            Ok(()) => {}
+            Err(TestError::Abort(reason)) => panic!("{name}: {reason}"),
+            Err(TestError::Fail(reason, (at, salt, changes))) => {
+                let text = input(&at, &changes);
+                let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("fuzz-{name}.input"));
+                std::fs::write(&path, &text).expect("the target folder can be written");
+                let shown = String::from_utf8_lossy(&text[..text.len().min(400)]).into_owned();
+                panic!("{name}: {reason}\n  salt {salt}: {}\n  {shown:?}", path.display());
+            }
         }
-        result.expect("inputs can be made");
         if seconds.is_none_or(|limit| begun.elapsed() > limit) {
             break;
         }

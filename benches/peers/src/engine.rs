@@ -151,7 +151,9 @@ pub fn contenders(quick: bool) -> Vec<Contender> {
         let of = |&(substeps, hertz)| Contender { hertz, ..Contender::new(maker, substeps, false) };
         all.extend(settings.iter().map(of));
     };
-    [Maker::Box2d, Maker::Rapier, ours(native)].map(|maker| add(maker, every));
+    for maker in [Maker::Box2d, Maker::Rapier, ours(native)] {
+        add(maker, every);
+    }
     for width in [LaneWidth::W16, LaneWidth::W8, LaneWidth::W4].into_iter().filter(|&w| w != native) {
         add(ours(width), &every[..every.len().min(3)]);
     }
@@ -159,7 +161,9 @@ pub fn contenders(quick: bool) -> Vec<Contender> {
     // `shim` sets its contact frequencies itself. `box2d` and `rapier` are this crate's versions of those
     // engines' methods.
     add(Maker::Solver("shim"), &[(14, 30.0), (8, 30.0), (3, 30.0)]);
-    ["box2d", "rapier"].map(|name| add(Maker::Solver(name), &default));
+    for name in ["box2d", "rapier"] {
+        add(Maker::Solver(name), &default);
+    }
     let anew = |maker| Contender { recycling: false, ..Contender::new(maker, 4, false) };
     all.extend([Maker::Box2d, Maker::Rapier].map(anew));
     all

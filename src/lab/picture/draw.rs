@@ -228,7 +228,9 @@ fn legend(
     let meters = round_down(0.6 * column / scale);
     let ends = [left(0.0), left(0.0) + meters * scale];
     drawing.line(ends.map(|x| [x, y]), INK, 2.0, 0.0);
-    ends.map(|x| drawing.line([[x, y - 5.0], [x, y + 5.0]], INK, 1.4, 0.0));
+    for x in ends {
+        drawing.line([[x, y - 5.0], [x, y + 5.0]], INK, 1.4, 0.0);
+    }
     text(drawing, [ends[0], 24.0], "start", &si_short(meters, "m"));
     if deepest > 0.0 {
         let (x, wide) = (left(1.0), 0.62 * column);

@@ -51,7 +51,8 @@ impl Recorder {
     pub fn new(world: &World, caption: Caption, every: u32, contacts: bool) -> Self {
         let stage = Stage::of(world);
         let moving = stage.shapes.iter().filter(|(b, _)| stage.kinds[*b as usize] != BodyKind::Static);
-        let widths = moving.map(|(_, s)| f64::from(s.min_half_extent())).filter(|w| w.is_finite());
+        let widths =
+            moving.map(|(_, s)| f64::from(s.min_half_extent())).filter(|w| *w > 0.0 && w.is_finite());
         let length = unit(widths.reduce(f64::min).unwrap_or(1.0));
         let masses = world.bodies.inv_mass.iter().filter(|m| **m > 0.0).map(|m| 1.0 / f64::from(*m));
         let [gx, gy] = world.settings.gravity.map(f64::from);
@@ -176,7 +177,7 @@ impl Recorder {
 
 /// The largest power of ten of which `size` has [`FINENESS`].
 fn unit(size: f64) -> f64 {
-    10f64.powf((size / FINENESS).log10().floor())
+    10f64.powi((size / FINENESS).log10().floor() as i32)
 }
 
 /// Numbers less those in their places in the frame before, which may have been shorter.
