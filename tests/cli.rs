@@ -21,6 +21,13 @@ fn errors(output: &Output) -> String {
     lines.map(|line| format!("{line}\n")).collect()
 }
 
+/// Runs the program with these words; it must succeed. Returns standard output.
+fn succeeds(folder: &Path, words: &str) -> String {
+    let output = simpulse(folder, &words.split_whitespace().collect::<Vec<_>>());
+    assert_eq!(output.status.code(), Some(0), "{words}: {}", text(&output.stderr));
+    text(&output.stdout).to_string()
+}
+
 fn entries(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> = std::fs::read_dir(folder)
         .unwrap()
@@ -115,8 +122,8 @@ fn bad_requests_are_refused_in_one_line() {
         (&["run", "stack:2", "--every", "5"], &["every", "--state"]),
         (&["run", "stack:2", "--state", "a.csv", "--contacts", "a.csv"], &["same file"]),
         (
-            &["run", "stack:2", "--joints", "a.csv", "--record", "a.csv"],
-            &["--record", "same file as --joints"],
+            &["run", "stack:2", "--contacts", "a.csv", "--joints", "a.csv"],
+            &["--joints", "file as --contacts"],
         ),
         (&["run", "missing.json"], &["missing.json"]),
         (&["run", "stack:2", "--state", "no/such/folder/s.csv"], &["no/such/folder/s.csv"]),
@@ -198,10 +205,7 @@ fn a_run_that_diverges_says_where_and_when_and_writes_nothing() {
     );
     assert_eq!(entries(folder.path()), ["fast.json"]);
 
-    let study =
-        simpulse(folder.path(), &["study", "--scenes", "fast.json", "--quick", "--lanes", "1", "--out", "r"]);
-    assert_eq!(study.status.code(), Some(0), "{}", text(&study.stderr));
-    let table = text(&study.stdout);
+    let table = &succeeds(folder.path(), "study --scenes fast.json --quick --lanes 1 --out r");
     assert!(table.contains("fast: no setting holds"), "{table}");
     let tables = std::fs::read_to_string(folder.path().join("r/tables.txt")).unwrap();
     assert!(tables.contains("failed") && tables.contains("diverged at step 1: body 1"), "{tables}");
@@ -211,22 +215,8 @@ fn a_run_that_diverges_says_where_and_when_and_writes_nothing() {
 #[test]
 fn a_small_study_leaves_whole_files() {
     let folder = tempfile::tempdir().unwrap();
-    let args = [
-        "study",
-        "--scenes",
-        "stack:3,bounce",
-        "--standard",
-        "--lanes",
-        "1,8",
-        "--steps",
-        "40",
-        "--repeats",
-        "1",
-        "--out",
-        "a/b",
-    ];
-    let output = simpulse(folder.path(), &args);
-    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let options = "--scenes stack:3,bounce --standard --lanes 1,8 --steps 40 --repeats 1 --out a/b";
+    let answer = succeeds(folder.path(), &format!("study {options}"));
     let out = folder.path().join("a/b");
     let kept: Vec<String> = entries(&out).into_iter().filter(|n| !n.starts_with("replay-")).collect();
     let names =
@@ -269,10 +259,9 @@ fn a_small_study_leaves_whole_files() {
 
     let svg = std::fs::read_to_string(out.join("speed_vs_error.svg")).unwrap();
     assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>") && svg.contains("stack:3"));
-    for text in [csv_text.as_str(), &json_text, &svg, text(&output.stdout)] {
+    for text in [csv_text.as_str(), &json_text, &svg, &answer] {
         assert!(!has_word(text, "nan") && !has_word(text, "inf"), "{text}");
     }
-    let answer = text(&output.stdout);
     assert!(answer.contains("The cheapest setting that is good enough") && answer.lines().count() <= 60);
 
     // The printed answer follows from the records alone.
@@ -321,9 +310,7 @@ fn a_sweep_leaves_a_curve_per_solver() {
     assert!(depth(0) > depth(2), "{} {}", depth(0), depth(2));
 
     // The step changes, the duration does not.
-    let dt = ["study", "--scenes", "stack:2", "--solvers", "pgs", "--sweep", "dt=10ms,0.02", "--out", "dt"];
-    let output = simpulse(folder.path(), &dt);
-    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    succeeds(folder.path(), "study --scenes stack:2 --solvers pgs --sweep dt=10ms,0.02 --out dt");
     let study = StudyFile::read(&folder.path().join("dt")).unwrap();
     let runs: Vec<(f64, u64)> = study.records.iter().map(|r| (r.dt, r.errors.unwrap().steps)).collect();
     assert_eq!(runs, [(0.01, 500), (0.02, 250)]);
@@ -342,16 +329,16 @@ fn header(path: &Path) -> String {
 #[test]
 fn every_csv_header_is_documented() {
     let folder = tempfile::tempdir().unwrap();
-    let run = |args: &[&str]| {
-        let output = simpulse(folder.path(), args);
-        assert_eq!(output.status.code(), Some(0), "{args:?}: {}", text(&output.stderr));
-    };
-    run(&["study", "--quick", "--scenes", "stack:2", "--solvers", "pgs", "--lanes", "1", "--out", "o"]);
-    run(&["converge", "stack:3", "--step", "20", "--solvers", "pgs", "--repeats", "0", "--out", "o"]);
-    run(&["agree", "--solvers", "pgs", "--out", "o"]);
-    run(&["growth", "--contacts", "1e2,3e2", "--settle", "2", "--repeats", "1", "--out", "o"]);
-    run(&["run", "stack:2", "--steps", "3", "--state", "o/state.csv", "--contacts", "o/contacts.csv"]);
-    run(&["run", "four_bar", "--steps", "3", "--joints", "o/joints.csv"]);
+    for words in [
+        "study --quick --scenes stack:2 --solvers pgs --lanes 1 --out o",
+        "converge stack:3 --step 20 --solvers pgs --repeats 0 --out o",
+        "agree --solvers pgs --out o",
+        "growth --contacts 1e2,3e2 --settle 2 --repeats 1 --out o",
+        "run stack:2 --steps 3 --state o/state.csv --contacts o/contacts.csv",
+        "run four_bar --steps 3 --joints o/joints.csv",
+    ] {
+        succeeds(folder.path(), words);
+    }
     let files = entries(&folder.path().join("o"));
     let written: Vec<&String> = files.iter().filter(|name| name.ends_with(".csv")).collect();
     assert_eq!(written.len(), columns::SHEETS.len(), "{written:?}");
@@ -442,22 +429,8 @@ const MACHINE: &str = r#"{"name":"machine","bodies":[
 fn a_run_writes_what_its_joints_bear() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("machine.json"), MACHINE).unwrap();
-    let args = [
-        "run",
-        "machine.json",
-        "--solver",
-        "pgs",
-        "--steps",
-        "8",
-        "--joints",
-        "j.csv",
-        "--every",
-        "4",
-        "--all",
-    ];
-    let output = simpulse(folder.path(), &args);
-    assert!(output.status.success(), "{}", errors(&output));
-    let printed = text(&output.stdout);
+    let run = "run machine.json --solver pgs --steps 8 --joints j.csv --every 4 --all";
+    let printed = succeeds(folder.path(), run);
     let figure = |name: &str| -> f64 {
         let found = printed.lines().find_map(|l| l.trim().strip_prefix(name));
         found.unwrap_or_else(|| panic!("{name}: {printed}")).trim().parse().unwrap()
@@ -508,17 +481,14 @@ fn a_run_writes_what_its_joints_bear() {
 #[test]
 fn a_run_writes_its_columns_at_the_steps_asked_for() {
     let folder = tempfile::tempdir().unwrap();
-    let args =
-        ["run", "stack:3", "--steps", "25", "--every", "10", "--state", "s.csv", "--contacts", "c.csv"];
-    let output = simpulse(folder.path(), &args);
-    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-    let all = simpulse(folder.path(), &["run", "stack:3", "--steps", "25", "--all"]);
+    let output = succeeds(folder.path(), "run stack:3 --steps 25 --every 10 --state s.csv --contacts c.csv");
+    let all = succeeds(folder.path(), "run stack:3 --steps 25 --all");
     for phase in ["pairs", "collide", "prepare", "solve", "relax", "integrate", "store", "penetration"] {
-        assert!(text(&all.stdout).contains(phase), "{phase}");
+        assert!(all.contains(phase), "{phase}");
     }
     // Without --all: eight figures in three groups.
-    let figures = text(&output.stdout).lines().filter(|line| line.starts_with("  ")).count();
-    assert_eq!(figures, 8, "{}", text(&output.stdout));
+    let figures = output.lines().filter(|line| line.starts_with("  ")).count();
+    assert_eq!(figures, 8, "{output}");
     let state = std::fs::read_to_string(folder.path().join("s.csv")).unwrap();
     let lines: Vec<&str> = state.lines().collect();
     assert_eq!(lines[0], "step,time,body,x,y,angle,vx,vy,omega");
@@ -576,67 +546,16 @@ fn the_default_study_names_scenes_that_exist() {
     simpulse::lab::study::StudyPlan::quick().check().unwrap();
 }
 
-/// Every command in the README and the papers, as words, without shell syntax.
-fn printed_commands() -> Vec<(String, Vec<String>)> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut files = vec![root.join("README.md")];
-    let papers = std::fs::read_dir(root.join("papers")).unwrap().map(|entry| entry.unwrap().path());
-    files.extend(papers.filter(|path| path.extension().is_some_and(|e| e == "md")));
-    let mut commands = Vec::new();
-    for file in files {
-        let content = std::fs::read_to_string(&file).unwrap();
-        let quoted = content.split('`').skip(1).step_by(2).filter(|part| !part.contains('\n'));
-        let mut fenced = false;
-        let code = content.lines().filter(|line| {
-            fenced ^= line.starts_with("```");
-            fenced
-        });
-        for line in code.chain(quoted) {
-            for part in line.split("# ").next().unwrap_or("").split([';', '|']) {
-                let part = part.trim().trim_start_matches("$ ");
-                let Some(rest) = part.strip_prefix("simpulse ") else { continue };
-                let rest = rest.split(" > ").next().unwrap_or(rest);
-                let words: Vec<String> = rest.split_whitespace().map(String::from).collect();
-                if words.first().is_some_and(|w| w == "=") {
-                    continue;
-                }
-                commands.push((format!("{}: {part}", file.display()), words));
-            }
-        }
-    }
-    commands
-}
-
-#[test]
-fn every_command_in_readme_and_papers_is_one() {
-    use clap::Parser;
-    let commands = printed_commands();
-    assert!(commands.len() > 30, "{}", commands.len());
-    for (place, words) in commands {
-        // `NAME` is a placeholder. Prose may mention a command without its required arguments.
-        let is_prose = words.len() == 1 && words[0].chars().all(|c| c.is_ascii_lowercase());
-        let words = words.iter().map(|w| if w == "NAME" { "arch" } else { w.as_str() });
-        let words: Vec<&str> = std::iter::once("simpulse").chain(words).collect();
-        if let Err(error) = simpulse::cli::args::Cli::try_parse_from(&words) {
-            let missing = error.kind() == clap::error::ErrorKind::MissingRequiredArgument;
-            assert!(is_prose && missing, "{place}: {error}");
-        }
-    }
-}
-
 #[test]
 fn a_scene_that_was_printed_falls_as_its_own_does() {
     let folder = tempfile::tempdir().unwrap();
     let printed = simpulse(folder.path(), &["scene", "stack:20", "--json"]).stdout;
     std::fs::write(folder.path().join("st.json"), &printed).unwrap();
-    let run = |args: &[&str]| {
-        let output = simpulse(folder.path(), args);
-        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-        serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()
+    let run = |scene: &str| {
+        let words = format!("run {scene} --solver pgs --steps 1200 --json");
+        serde_json::from_str::<serde_json::Value>(&succeeds(folder.path(), &words)).unwrap()
     };
-    let options = ["--solver", "pgs", "--steps", "1200", "--json"];
-    let own = run(&[&["run", "stack:20"], &options[..]].concat());
-    let file = run(&[&["run", "st.json"], &options[..]].concat());
+    let (own, file) = (run("stack:20"), run("st.json"));
     for key in ["holds", "failed_step", "reference", "errors"] {
         assert_eq!(own[key], file[key], "{key}");
     }
@@ -647,12 +566,8 @@ fn a_scene_that_was_printed_falls_as_its_own_does() {
     let bare =
         r#"{"name":"b","bodies":[{"type":"dynamic","position":[0,0],"shapes":[{"circle":{"radius":1}}]}]}"#;
     std::fs::write(folder.path().join("bare.json"), bare).unwrap();
-    let output = simpulse(folder.path(), &["run", "bare.json", "--steps", "5"]);
-    assert!(
-        text(&output.stdout).contains("not checked: conditions and reference values"),
-        "{}",
-        text(&output.stdout)
-    );
+    let told = succeeds(folder.path(), "run bare.json --steps 5");
+    assert!(told.contains("not checked: conditions and reference values"), "{told}");
 }
 
 #[test]
@@ -671,16 +586,12 @@ fn what_a_solver_ignores_is_refused_with_who_has_it() {
 #[test]
 fn a_part_that_is_missing_and_a_folder_in_use_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let part = |i: usize| {
-        let (shard, out) = (format!("{i}/3"), format!("part-{i}"));
-        let args = ["--quick", "--scenes", "stack:2,stack:3,stack:4", "--solvers", "pgs", "--lanes", "1"];
-        let output = simpulse(folder.path(), &[&args[..], &["--shard", &shard, "--out", &out]].concat());
-        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-    };
-    (1..=3).for_each(part);
+    for i in 1..=3 {
+        let options = "--quick --scenes stack:2,stack:3,stack:4 --solvers pgs --lanes 1";
+        succeeds(folder.path(), &format!("{options} --shard {i}/3 --out part-{i}"));
+    }
     refused(folder.path(), &["merge", "part-1", "part-3"], &["stack:3", "--partial"]);
-    let whole = simpulse(folder.path(), &["merge", "part-1", "part-2", "part-3", "--out", "whole"]);
-    assert_eq!(whole.status.code(), Some(0), "{}", text(&whole.stderr));
+    succeeds(folder.path(), "merge part-1 part-2 part-3 --out whole");
 
     let lock = simpulse::lab::files::Lock::of(&folder.path().join("whole")).unwrap();
     let args = ["--quick", "--scenes", "stack:2", "--solvers", "pgs", "--lanes", "1", "--out", "whole"];

@@ -6,13 +6,10 @@ use super::capture::CaptureArgs;
 use super::compare::CompareArgs;
 use super::converge::ConvergeArgs;
 use super::merge::MergeArgs;
-use super::papers::PapersArgs;
 use super::profile::ProfileArgs;
-use super::replay::ReplayArgs;
 use super::report::ReportArgs;
 use super::run::RunArgs;
 use super::savings::SavingsArgs;
-use super::snapshot::SnapshotArgs;
 use super::study::{EXAMPLES as STUDY_EXAMPLES, StudyArgs};
 use super::values;
 use super::verify::VerifyArgs;
@@ -60,8 +57,6 @@ pub enum Command {
     Compare(CompareArgs),
     Merge(MergeArgs),
     Run(RunArgs),
-    Snapshot(SnapshotArgs),
-    Replay(ReplayArgs),
     Report(ReportArgs),
     Advise(AdviseArgs),
     Capture(CaptureArgs),
@@ -70,7 +65,6 @@ pub enum Command {
     Agree(AgreeArgs),
     Profile(ProfileArgs),
     Savings(SavingsArgs),
-    Papers(PapersArgs),
     /// List the scenes
     Scenes(ListArgs),
     /// List the solvers

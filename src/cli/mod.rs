@@ -12,15 +12,14 @@ pub mod converge;
 pub mod interrupt;
 pub mod merge;
 pub mod output;
-pub mod papers;
+pub mod picture;
 pub mod profile;
 pub mod progress;
 pub mod random;
-pub mod replay;
+pub mod record;
 pub mod report;
 pub mod run;
 pub mod savings;
-pub mod snapshot;
 pub mod study;
 pub mod times;
 pub mod values;
@@ -99,8 +98,6 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Compare(args)) => compare::run(&args),
         Some(Command::Merge(args)) => merge::run(&args),
         Some(Command::Run(args)) => run::run(&args),
-        Some(Command::Snapshot(args)) => snapshot::run(&args),
-        Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::Report(args)) => report::run(&args),
         Some(Command::Advise(args)) => advise::run(&args),
         Some(Command::Capture(args)) => capture::run(&args),
@@ -109,7 +106,6 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Agree(args)) => agree::run(&args),
         Some(Command::Profile(args)) => profile::run(&args),
         Some(Command::Savings(args)) => savings::run(&args),
-        Some(Command::Papers(args)) => papers::run(&args),
         Some(Command::Scenes(args)) => scenes(&args),
         Some(Command::Solvers(args)) => solvers(&args),
         Some(Command::Scene(args)) => print(&scene(&args)?),

@@ -1,7 +1,9 @@
 //! `simpulse run`: one scene, one solver; times per phase, errors, and trajectories as CSV.
 
 use super::output::{note, print_beside, print_json, value};
+use super::picture::{self, PictureArgs};
 use super::progress::Bar;
+use super::record::{self, RecordArgs};
 use super::times::Times;
 use super::values::{self, SettingArgs, scene_help};
 use crate::engine::constraints::records::rows::RowLaw;
@@ -13,7 +15,6 @@ use crate::lab::files::{Pending, same_file};
 use crate::lab::metrics::state::Angles;
 use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides;
-use crate::lab::recording::record::{Caption, Recorder};
 use crate::lab::report::columns;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::table::error_list;
@@ -25,7 +26,6 @@ use crate::lab::study::{FailedAt, TruthError, budget, open_scene};
 use clap::Args;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -40,7 +40,9 @@ Examples:
   simpulse run stack:20
   simpulse run arch --solver pgs --velocity-iterations 32 --all
   simpulse run my.json --steps 600 --state out.csv --contacts contacts.csv --every 60
-  simpulse run crane --joints joints.csv --every 1")]
+  simpulse run crane --joints joints.csv --every 1
+  simpulse run pyramid:20 --picture pyramid.svg --step 120
+  simpulse run stack:12 --solvers pgs,soft_step --record replay.html --record-contacts")]
 pub struct RunArgs {
     /// Scene
     #[arg(value_name = "SCENE", value_parser = values::scene(), help = scene_help())]
@@ -73,12 +75,12 @@ pub struct RunArgs {
     /// Write a CSV of joints with their gaps, angles, impulses by row (N·s over the step) and loads
     #[arg(long, value_name = "FILE.csv")]
     pub joints: Option<PathBuf>,
-    /// Write a recording for `simpulse replay`
-    #[arg(long, value_name = "FILE")]
-    pub record: Option<PathBuf>,
-    /// Also record contact points and impulses
-    #[arg(long, requires = "record")]
-    pub record_contacts: bool,
+    /// Picture of a frame
+    #[command(flatten)]
+    pub picture: PictureArgs,
+    /// Recording
+    #[command(flatten)]
+    pub record: RecordArgs,
     /// Write every K-th step [default: the last step only in CSV files, every step in a recording]
     #[arg(long, value_name = "K")]
     pub every: Option<u32>,
@@ -120,19 +122,19 @@ fn size_note(world: &World) -> Option<String> {
 
 /// Runs the scene. Its files are written after the whole run.
 pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
-    let settings = settings(&args.setting, args.order, args.lanes)?;
-    let settings = Settings { continuous: args.continuous.unwrap_or(settings.continuous), ..settings };
     for (name, value) in [("steps", args.steps), ("every", args.every)] {
         if value == Some(0) {
             return Err(Error::invalid(name, "0 is too few: at least 1 is needed"));
         }
     }
-    let files = [
-        ("--state", &args.state),
-        ("--contacts", &args.contacts),
-        ("--joints", &args.joints),
-        ("--record", &args.record),
-    ];
+    if let Some(path) = &args.picture.picture {
+        return picture::run(args, path);
+    }
+    if let Some(path) = &args.record.record {
+        return record::run(args, path);
+    }
+    let settings = settings(args, args.setting.settings()?)?;
+    let files = [("--state", &args.state), ("--contacts", &args.contacts), ("--joints", &args.joints)];
     let files: Vec<(&str, &Path)> =
         files.into_iter().filter_map(|(name, file)| Some((name, file.as_deref()?))).collect();
     if args.every.is_some() && files.is_empty() {
@@ -154,14 +156,6 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         args.contacts.as_deref().map(|path| CsvFile::new(path, &columns::CONTACTS)).transpose()?;
     let mut joints = args.joints.as_deref().map(|path| CsvFile::new(path, &columns::JOINTS)).transpose()?;
 
-    let every = args.every.unwrap_or(1);
-    let recorder = args.record.as_ref().map(|path| -> Result<_, Error> {
-        let (scene, solver) = (scene.name.clone(), world.settings.solver.name.into());
-        let caption = Caption { scene, solver, setting: how(&world) };
-        // Created now, so that a file that cannot be written is reported before the run.
-        Ok((Pending::new(path)?, Recorder::new(&world, caption, every, args.record_contacts)))
-    });
-    let mut recorder = recorder.transpose()?;
     let mut observation = Observation::new(&world);
     let mut watch = HoldWatch::new(&world, loaded.demands.clone());
     let mut angles = Angles::new(&world, scene.bodies.iter().map(|b| b.angle));
@@ -185,9 +179,6 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
             return diverged(divergence.into());
         }
         bar.step(step as usize, scene.steps as usize, "steps");
-        if let Some((_, recorder)) = &mut recorder {
-            recorder.add(&world)?;
-        }
         observation.observe(&world);
         watch.observe(&world);
         angles.add(&world);
@@ -218,12 +209,6 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let found =
         RunResult { times, errors: observation.errors(), truth, broken: watch.broken(), unchecked, rests };
     let mut written = String::new();
-    if let (Some((mut file, recorder)), Some(path)) = (recorder, &args.record) {
-        let outcome = found.broken.map_or("holds".to_string(), |broken| broken.to_string());
-        file.write_all(&recorder.finish(&outcome)?).map_err(Error::io(path))?;
-        file.commit()?;
-        written += &format!("wrote {}\n", path.display());
-    }
     for sheet in [state, contacts, joints].into_iter().flatten() {
         written += &format!("wrote {}\n", sheet.path.clone());
         sheet.commit()?;
@@ -244,10 +229,11 @@ fn estimate(scene: &Scene, settings: &Settings) -> Estimate {
     Estimate { seconds, bytes: estimate::memory(bodies, 0, 1) }
 }
 
-/// Settings of the world. Errors: an impossible budget, a parameter out of its range, natural order in lanes.
-pub fn settings(setting: &SettingArgs, order: Order, lanes: Option<LaneWidth>) -> Result<Settings, Error> {
-    let own = setting.settings()?;
-    let own = match (order, lanes) {
+/// The settings of a solver with the order and lanes of the command. Errors: natural order in lanes.
+pub(super) fn settings(args: &RunArgs, own: Settings) -> Result<Settings, Error> {
+    let own = Settings { continuous: args.continuous.unwrap_or(own.continuous), ..own };
+    let order = args.order;
+    let own = match (order, args.lanes) {
         (Order::Colored, Some(width)) => own.exactly(width),
         (Order::Colored, None) => own,
         (_, None | Some(LaneWidth::W1)) => own.exactly(LaneWidth::W1),
@@ -401,7 +387,7 @@ fn json(world: &World, scene: &Scene, found: &RunResult) -> Result<Value, Error>
 }
 
 /// Budget, and order or lanes, as text.
-fn how(world: &World) -> String {
+pub(super) fn how(world: &World) -> String {
     let s = &world.settings;
     let order = match s.order {
         Order::Colored => lanes(world.lane_width().lanes()),

@@ -27,6 +27,7 @@ use simpulse::engine::params::{Budget, Without};
 use simpulse::engine::shapes::Shape;
 use std::hint::black_box;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 use wide::{f32x4, f32x8, f32x16};
 
 type Full = Kernel<true, true, 2>;
@@ -114,44 +115,43 @@ impl Given {
     }
 }
 
-type Pass = (&'static str, fn(&mut Given));
+/// What a pass reads, and what of it is checked: rows, contacts, side records.
+#[derive(Clone, Copy, PartialEq)]
+enum Reads {
+    Rows,
+    Contacts,
+    Both,
+    Bounces,
+}
 
-/// Passes that read rows, some of which also read contacts or side records.
-fn row_passes<L: Lanes>() -> [Pass; 7] {
+type Pass = (&'static str, Reads, fn(&mut Given));
+
+/// Every pass over constraints.
+fn passes<L: Lanes>() -> [Pass; 9] {
+    use Reads::{Both, Bounces, Contacts, Rows};
     [
-        ("sweep", |g| sweep::<L, Full, _>(&mut g.rows, &mut g.batches, RULE)),
-        ("sweep_store", |g| {
+        ("sweep", Rows, |g| sweep::<L, Full, _>(&mut g.rows, &mut g.batches, RULE)),
+        ("sweep_store", Rows, |g| {
             sweep_store::<L, Full, _, _>(&mut RowColumns::from_rows(&g.rows), &mut g.batches, RULE);
         }),
-        ("warm_start", |g| warm_start::<L, Full>(&mut g.rows, &mut g.batches)),
-        ("position_sweep", |g| position_sweep::<L, Full>(&mut g.rows, &mut g.batches, POSITION)),
-        ("prepare", |g| prepare::prepare::<L, Full>(&mut g.rows, &mut g.batches, &g.contacts)),
-        ("restitution::prepare", |g| g.prepare_bounces::<L>()),
-        ("restitution::apply", |g| {
+        ("warm_start", Rows, |g| warm_start::<L, Full>(&mut g.rows, &mut g.batches)),
+        ("position_sweep", Rows, |g| position_sweep::<L, Full>(&mut g.rows, &mut g.batches, POSITION)),
+        ("restitution::apply", Rows, |g| {
             restitution::apply::<L, Full>(&mut g.rows, &mut g.batches, &mut g.bounces);
+        }),
+        ("prepare", Both, |g| prepare::prepare::<L, Full>(&mut g.rows, &mut g.batches, &g.contacts)),
+        ("restitution::prepare", Both, |g| g.prepare_bounces::<L>()),
+        ("store", Contacts, |g| prepare::store::<L, Full>(&mut g.batches, &mut g.contacts)),
+        ("restitution::track", Bounces, |g| {
+            restitution::track::<L, Full>(&mut g.batches, &mut g.bounces);
         }),
     ]
 }
 
-/// Passes that index contacts.
-fn contact_passes<L: Lanes>() -> [Pass; 3] {
-    [
-        ("prepare", |g| prepare::prepare::<L, Full>(&mut g.rows, &mut g.batches, &g.contacts)),
-        ("store", |g| prepare::store::<L, Full>(&mut g.batches, &mut g.contacts)),
-        ("restitution::prepare", |g| g.prepare_bounces::<L>()),
-    ]
-}
-
-/// Passes over side records that read no rows.
-fn bounce_passes<L: Lanes>() -> [Pass; 1] {
-    [("restitution::track", |g| restitution::track::<L, Full>(&mut g.batches, &mut g.bounces))]
-}
-
-fn all_passes<L: Lanes>() -> Vec<Pass> {
-    let mut passes = row_passes::<L>().to_vec();
-    passes.extend(contact_passes::<L>());
-    passes.extend(bounce_passes::<L>());
-    passes
+/// Every pass that reads rows, or contacts.
+fn reading<L: Lanes>(what: Reads) -> impl Iterator<Item = (&'static str, fn(&mut Given))> {
+    let all = passes::<L>().into_iter();
+    all.filter(move |(_, reads, _)| [what, Reads::Both].contains(reads)).map(|(name, _, pass)| (name, pass))
 }
 
 /// Runs a test body at every width.
@@ -180,46 +180,45 @@ at_every_width! {
 }
 
 fn run_good<L: Lanes>() {
-    for (name, pass) in all_passes::<L>() {
+    for (name, _, pass) in passes::<L>() {
         let mut given = Given::new(good(L::WIDTH)).with_bounces::<L>();
         pass(&mut given);
         assert!(given.rows[0].velocity[3] == 1.0, "{name}");
     }
     // Batches that were never filled contain no work.
-    for (_, pass) in all_passes::<L>() {
+    for (.., pass) in passes::<L>() {
         pass(&mut Given { rows: vec![], contacts: vec![], ..Given::new(Batches::default()) });
     }
 }
 
 fn bad_rows<L: Lanes>() {
     for far in FAR {
-        for (name, pass) in row_passes::<L>() {
-            let mut given = Given::new(batches(L::WIDTH, 9, 9, far)).with_bounces::<L>();
-            let text = panic_of(|| pass(&mut given));
-            assert!(text.contains(&far.to_string()), "{name}: {text}");
+        for (name, pass) in reading::<L>(Reads::Rows) {
             // Against a dynamic body, row a is read too.
-            let mut given = Given::new(batches(L::WIDTH, 9, far, 10)).with_bounces::<L>();
-            let text = panic_of(|| pass(&mut given));
-            assert!(text.contains(&far.to_string()), "{name}: {text}");
+            for [a, b] in [[9, far], [far, 10]] {
+                let mut given = Given::new(batches(L::WIDTH, 9, a, b)).with_bounces::<L>();
+                let text = panic_of(|| pass(&mut given));
+                assert!(text.contains(&far.to_string()), "{name}: {text}");
+            }
         }
     }
 }
 
 fn bad_contacts<L: Lanes>() {
     for far in FAR {
-        for (name, pass) in contact_passes::<L>() {
+        for (name, pass) in reading::<L>(Reads::Contacts) {
             let mut given = Given::new(batches(L::WIDTH, far, 9, 10));
             let text = panic_of(|| pass(&mut given));
             assert!(text.contains(&far.to_string()), "{name}: {text}");
         }
     }
-    for (_, pass) in contact_passes::<L>() {
+    for (_, pass) in reading::<L>(Reads::Contacts) {
         panic_of(|| pass(&mut Given { contacts: vec![], ..Given::new(good(L::WIDTH)) }));
     }
 }
 
 fn short_rows<L: Lanes>() {
-    for (name, pass) in row_passes::<L>() {
+    for (name, pass) in reading::<L>(Reads::Rows) {
         for count in [0, 1, CONTACTS] {
             let rows = vec![BodyRow::default(); count];
             let mut given = Given { rows, ..Given::new(good(L::WIDTH)) }.with_bounces::<L>();
@@ -231,7 +230,7 @@ fn short_rows<L: Lanes>() {
 
 fn wrong_width<L: Lanes>() {
     for width in [1, 2, 3, 4, 8, 16, 32, 1000].into_iter().filter(|&w| w != L::WIDTH) {
-        for (_, pass) in all_passes::<L>() {
+        for (.., pass) in passes::<L>() {
             let mut given = Given::new(good(width)).with_bounces::<L>();
             panics(&format!("batches of {width} lanes for a kernel of {}", L::WIDTH), || pass(&mut given));
         }
@@ -262,7 +261,7 @@ fn wrong_layout<L: Lanes>() {
 }
 
 fn no_buffer<L: Lanes>() {
-    for (_, pass) in all_passes::<L>() {
+    for (.., pass) in passes::<L>() {
         let mut batches = Batches::default();
         batches.clear(L::WIDTH);
         let kind = OppositeKind::Dynamic;
@@ -275,9 +274,10 @@ fn no_buffer<L: Lanes>() {
 }
 
 fn no_bounces<L: Lanes>() {
-    let [.., apply] = row_passes::<L>();
-    for (_, pass) in bounce_passes::<L>().into_iter().chain([apply]) {
-        panics("`prepare` makes them", || pass(&mut Given::new(good(L::WIDTH))));
+    for (name, _, pass) in passes::<L>() {
+        if ["restitution::apply", "restitution::track"].contains(&name) {
+            panics("`prepare` makes them", || pass(&mut Given::new(good(L::WIDTH))));
+        }
     }
 }
 
@@ -393,8 +393,6 @@ fn a_step_says_what_is_wrong_before_it_begins() {
     panics("batches of 8 lanes for kernels of 1", || new(Batches::default(), good(8), CONTACTS));
 }
 
-const KINDS: [PairKind; 5] = PairKind::ALL;
-
 /// Collides `pairs` pairs of the same body and shape, after `spoil` has changed one list.
 fn collide(kind: PairKind, width: LaneWidth, pairs: u32, contacts: usize, spoil: impl Fn(&mut Jobs)) {
     let mut shapes = Shapes::default();
@@ -420,26 +418,25 @@ fn collide(kind: PairKind, width: LaneWidth, pairs: u32, contacts: usize, spoil:
 
 #[test]
 fn the_narrow_phase_refuses_pairs_of_what_does_not_exist() {
-    for kind in KINDS {
+    for kind in PairKind::ALL {
         for width in LaneWidth::ALL {
             for pairs in [1, 16, 21] {
                 collide(kind, width, pairs, 0, |_| {});
                 collide(kind, width, pairs, 1, |jobs| jobs.contact[0] = 0);
-                for far in [1, 1_000_000_000, u32::MAX] {
-                    for end in [0, pairs as usize - 1] {
-                        for side in [0, 1] {
-                            let words = format!("a pair of bodies {far} of 1");
-                            let spoil = |jobs: &mut Jobs| jobs.bodies[side][end] = far;
-                            panics(&words, || collide(kind, width, pairs, 0, spoil));
-                            let words = format!("a pair of shapes {far} of 1");
-                            let spoil = |jobs: &mut Jobs| jobs.shapes[side][end] = far;
-                            panics(&words, || collide(kind, width, pairs, 0, spoil));
-                        }
-                        if far != NO_CONTACT {
-                            let spoil = |jobs: &mut Jobs| jobs.contact[end] = far;
-                            let words = format!("a pair of contact {far} of 1");
-                            panics(&words, || collide(kind, width, pairs, 1, spoil));
-                        }
+                for (far, end) in [1, 1_000_000_000, u32::MAX]
+                    .into_iter()
+                    .flat_map(|far| [0, pairs as usize - 1].map(|end| (far, end)))
+                {
+                    let refused = |what: &str, contacts: usize, spoil: &dyn Fn(&mut Jobs)| {
+                        let words = format!("a pair of {what} {far} of 1");
+                        panics(&words, || collide(kind, width, pairs, contacts, spoil));
+                    };
+                    for side in [0, 1] {
+                        refused("bodies", 0, &|jobs| jobs.bodies[side][end] = far);
+                        refused("shapes", 0, &|jobs| jobs.shapes[side][end] = far);
+                    }
+                    if far != NO_CONTACT {
+                        refused("contact", 1, &|jobs| jobs.contact[end] = far);
                     }
                 }
                 for list in 0..5 {
@@ -474,75 +471,40 @@ fn prefetches_are_hints_at_any_address() {
     }
 }
 
-mod words {
-    //! Files that may contain unsafe code.
+/// Files below a folder that allow unsafe code, which is denied everywhere else.
+fn allowing(folder: &Path, found: &mut Vec<String>) {
+    for entry in std::fs::read_dir(folder).expect("a folder of sources") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            allowing(&path, found);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            let text = std::fs::read_to_string(&path).expect("a source file");
+            if text.lines().any(|line| line.trim_start().starts_with("#![allow(unsafe_code")) {
+                found.push(path.strip_prefix(ROOT).expect("below the root").display().to_string());
+            }
+        }
+    }
+}
 
-    use std::fs;
-    use std::path::Path;
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
-    /// The complete list. Each file gives its reason.
-    const LISTED: [&str; 4] = [
+/// The complete list of files with unsafe code. Each gives its reason.
+#[test]
+fn unsafe_code_is_only_in_listed_files() {
+    let manifest = std::fs::read_to_string(Path::new(ROOT).join("Cargo.toml")).expect("the manifest");
+    assert!(manifest.contains("unsafe_code = \"deny\""));
+    let mut found = vec![];
+    for folder in ["src", "tests", "benches"] {
+        allowing(&Path::new(ROOT).join(folder), &mut found);
+    }
+    found.sort();
+    let listed = [
         "benches/peers/src/box2d.rs",
         "src/engine/lanes/quads.rs",
         "src/engine/lanes/rows.rs",
         "tests/allocations.rs",
     ];
-
-    /// The code of a file without line comments and string contents.
-    fn code(text: &str) -> String {
-        let mut code = String::new();
-        for line in text.lines() {
-            let line = line.split("//").next().unwrap_or("");
-            code.extend(line.split('"').step_by(2).chain(["\n"]));
-        }
-        code
-    }
-
-    fn has_word(code: &str, word: &str) -> bool {
-        code.split(|c: char| !c.is_alphanumeric() && c != '_').any(|w| w == word)
-    }
-
-    fn walk(folder: &Path, visit: &mut impl FnMut(&Path)) {
-        for entry in fs::read_dir(folder).expect("a folder of sources") {
-            let path = entry.expect("an entry").path();
-            if path.is_dir() {
-                walk(&path, visit);
-            } else if path.extension().is_some_and(|e| e == "rs") {
-                visit(&path);
-            }
-        }
-    }
-
-    #[test]
-    fn unsafe_code_is_only_in_listed_files() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let (mut found, mut allowed) = (vec![], vec![]);
-        for folder in ["src", "tests", "benches"] {
-            walk(&root.join(folder), &mut |path| {
-                let code = code(&fs::read_to_string(path).expect("a source file"));
-                let name = path.strip_prefix(root).expect("below the root").to_str().expect("a name");
-                let name = name.replace('\\', "/");
-                if has_word(&code, "unsafe") {
-                    found.push(name.clone());
-                }
-                if has_word(&code, "unsafe_code") {
-                    allowed.push(name);
-                }
-            });
-        }
-        found.sort();
-        allowed.sort();
-        assert_eq!(found, LISTED);
-        assert_eq!(allowed, LISTED);
-    }
-
-    #[test]
-    fn comments_and_strings_are_no_code() {
-        assert!(has_word(&code("unsafe { x() } // safe"), "unsafe"));
-        assert!(has_word(&code("let x = \"a\"; unsafe fn f()"), "unsafe"));
-        assert!(!has_word(&code("//! unsafe\nlet x = \"unsafe\"; // unsafe"), "unsafe"));
-        assert!(!has_word(&code("#![allow(unsafe_code)]"), "unsafe"));
-    }
+    assert_eq!(found, listed);
 }
 
 /// A world can be stepped on any thread.

@@ -15,6 +15,7 @@ mod impulses;
 mod invariance;
 mod joint_files;
 mod metrics;
+mod papers;
 mod piles;
 mod plastic;
 mod profile;

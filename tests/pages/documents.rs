@@ -5,25 +5,15 @@ use clap::Parser;
 use simpulse::cli::args::Cli;
 use std::path::{Path, PathBuf};
 
-const DOCUMENTS: [&str; 10] = [
-    "README.md",
-    "papers/README.md",
-    "papers/claims.md",
-    "papers/contest.md",
-    "papers/joints.md",
-    "papers/peers.md",
-    "papers/shim.md",
-    "papers/solver2d.md",
-    "src/lab/README.md",
-    "src/lab/profile/README.md",
-];
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-fn read(name: &str) -> String {
-    std::fs::read_to_string(root().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+/// Every Markdown file of these folders and the README, with its text.
+fn documents() -> Vec<(PathBuf, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut paths = vec![root.join("README.md")];
+    for folder in ["papers", "src/lab", "src/lab/profile"] {
+        let entries = std::fs::read_dir(root.join(folder)).unwrap().map(|entry| entry.unwrap().path());
+        paths.extend(entries.filter(|path| path.extension().is_some_and(|e| e == "md")));
+    }
+    paths.into_iter().map(|path| (path.clone(), std::fs::read_to_string(path).unwrap())).collect()
 }
 
 /// Lines of shell blocks, and text between backticks.
@@ -56,85 +46,60 @@ fn words(command: &str) -> Option<Vec<&str>> {
 #[test]
 fn commands_of_the_documents_parse() {
     let (mut count, mut wrong) = (0, Vec::new());
-    for name in DOCUMENTS {
-        for command in commands(&read(name)) {
+    for (path, text) in documents() {
+        for command in commands(&text) {
             let Some(words) = words(&command) else { continue };
             count += 1;
             if let Err(error) = Cli::try_parse_from(&words) {
-                wrong.push(format!("{name}: {command}\n{error}"));
+                wrong.push(format!("{}: {command}\n{error}", path.display()));
             }
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    assert!(count > 60, "{count} commands found");
+    assert!(count > 40, "{count} commands found");
+}
+
+/// The functions of the sources below a folder, and the names of their files: filters of tests.
+fn filters(folder: &Path) -> String {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let of = |path: PathBuf| match std::fs::read_to_string(&path) {
+        _ if path.is_dir() => filters(&path),
+        Ok(text) => text.lines().filter(|l| l.contains("fn ")).map(|l| format!("{l}\n")).collect(),
+        Err(_) => String::new(),
+    };
+    entries.map(|path| path.file_name().unwrap().to_string_lossy().into_owned() + "\n" + &of(path)).collect()
 }
 
 #[test]
 fn tests_that_the_documents_name_exist() {
-    let mut sources = String::new();
-    let mut folders: Vec<PathBuf> = vec![root().join("tests"), root().join("src")];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|e| e == "rs") {
-                // Module names are valid filters, too.
-                sources += &format!("fn {}\n", path.file_stem().unwrap().to_string_lossy());
-                sources += &std::fs::read_to_string(path).unwrap();
-            }
-        }
-    }
-    let manifest = read("Cargo.toml");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let sources = ["tests", "src"].map(|folder| filters(&root.join(folder))).concat();
+    let manifest = std::fs::read_to_string(root.join("Cargo.toml")).unwrap();
     let mut count = 0;
-    for name in DOCUMENTS {
-        for command in commands(&read(name)) {
-            let words: Vec<&str> = command.split_whitespace().take_while(|&word| word != "--").collect();
-            if words.get(..2) != Some(&["cargo", "test"]) || words.contains(&"NAME") {
-                continue;
-            }
-            if let Some(k) = words.iter().position(|&word| word == "--test") {
-                assert!(manifest.contains(&format!("name = \"{}\"", words[k + 1])), "{name}: {command}");
-            }
-            // A filter is the last word, after an option's value or a flag.
-            let Some(&filter) = words.last().filter(|_| words.len() > 5 || words.contains(&"--lib")) else {
-                continue;
-            };
-            let is_target = words[words.len() - 2] == "--test" || filter.starts_with('-');
-            if !is_target && !words[words.len() - 2].starts_with("--target") {
-                count += 1;
-                assert!(
-                    sources.lines().any(|l| l.contains("fn ") && l.contains(filter)),
-                    "{name}: {command}"
-                );
+    for (path, text) in documents() {
+        for command in commands(&text).iter().filter(|c| c.starts_with("cargo test") && !c.contains("NAME")) {
+            let words = command.split_whitespace().skip(2).take_while(|&word| word != "--");
+            for word in words.filter(|word| !word.starts_with('-') && !word.contains('/')) {
+                let is_target = manifest.contains(&format!("\"{word}"));
+                assert!(is_target || sources.contains(word), "{}: {word} in {command}", path.display());
+                count += usize::from(!is_target);
             }
         }
     }
-    assert!(count > 10, "{count} filters found");
+    assert!(count > 5, "{count} filters found");
 }
 
 #[test]
 fn quick_commands_of_the_readme_run() {
     let folder = tempfile::tempdir().unwrap();
-    let quick = ["run", "scene", "scenes", "solvers", "columns", "capture", "converge", "snapshot"];
+    let quick = ["run", "scene", "scenes", "solvers", "columns", "list", "capture", "converge"];
+    let readme = &documents()[0].1;
+    assert!(readme.len() <= 8192, "{} bytes: the README is short", readme.len());
     let mut count = 0;
-    for command in commands(&read("README.md")) {
+    for command in commands(readme) {
         let Some(words) = words(&command).filter(|words| quick.contains(&words[1])) else { continue };
-        super::succeeds(folder.path(), &words[1..]);
+        super::succeeds(folder.path(), &words[1..].join(" "));
         count += 1;
     }
     assert!(count >= 4, "{count} commands ran");
-}
-
-/// Every claim is within the range stated in its row.
-#[test]
-fn claims_are_within_their_ranges() {
-    let printed = super::succeeds(root(), &["papers"]);
-    assert!(printed.lines().count() > 30 && !printed.contains("OUTSIDE"), "{printed}");
-}
-
-#[test]
-fn the_readme_is_short() {
-    let length = read("README.md").len();
-    assert!(length <= 8192, "{length} bytes");
 }

@@ -2,7 +2,7 @@
 
 #![allow(unsafe_code, reason = "a C library")]
 
-use crate::engine::{Contender, Engine, Stage, State};
+use crate::engine::{Contender, Engine, Stages, State, stages_of};
 use boxdd_sys::ffi::*;
 use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::joints::JointKind;
@@ -74,11 +74,6 @@ impl Box2d {
             }
             Ok(engine)
         }
-    }
-
-    fn profile(&self) -> b2Profile {
-        // SAFETY: the world lives as long as `self`.
-        unsafe { b2World_GetProfile(self.world) }
     }
 }
 
@@ -220,34 +215,16 @@ impl Engine for Box2d {
         ends / 2
     }
 
-    fn stages(&self) -> [Option<f64>; Stage::ALL.len()] {
-        let p = self.profile();
-        Stage::ALL.map(|stage| {
-            let ms = match stage {
-                Stage::Pairs => p.pairs + p.transforms + p.refit,
-                Stage::Collide => p.collide,
-                Stage::Color => p.solverSetup,
-                Stage::Prepare => p.prepareConstraints,
-                Stage::WarmStart => p.warmStart,
-                Stage::Solve => p.solveImpulses,
-                Stage::Relax => p.relaxImpulses + p.applyRestitution,
-                Stage::Integrate => p.integrateVelocities + p.integratePositions,
-                Stage::Stages => {
-                    p.warmStart
-                        + p.solveImpulses
-                        + p.relaxImpulses
-                        + p.applyRestitution
-                        + p.integrateVelocities
-                        + p.integratePositions
-                }
-                Stage::Store => p.storeImpulses,
-            };
-            Some(f64::from(ms))
-        })
+    fn stages(&self) -> Stages {
+        // SAFETY: the world lives as long as `self`.
+        let p = unsafe { b2World_GetProfile(self.world) };
+        // Colors are maintained while colliding.
+        let before = [p.pairs + p.transforms + p.refit, p.collide, p.solverSetup, p.prepareConstraints];
+        let relax = p.relaxImpulses + p.applyRestitution;
+        let integrate = p.integrateVelocities + p.integratePositions;
+        let within = [p.warmStart, p.solveImpulses, relax, integrate];
+        stages_of(before.map(f64::from), within.map(f64::from), p.storeImpulses.into())
     }
-
-    /// Box2D's clocks always run.
-    fn set_timed(&mut self, _: bool) {}
 }
 
 impl Drop for Box2d {

@@ -1,7 +1,11 @@
 //! The interface of an engine for the race and the check, and the settings it runs with.
 
+use crate::box2d::Box2d;
+use crate::ours::Simpulse;
+use crate::rapier::Rapier;
 use simpulse::engine::broadphase::BroadPhaseKind;
 use simpulse::engine::lanes::{LaneWidth, native_width};
+use simpulse::lab::scenes::Scene;
 
 /// A scene inside an engine: one thread, no sleeping.
 pub trait Engine {
@@ -17,11 +21,12 @@ pub trait Engine {
     /// Number of contact points that the engine currently solves.
     fn points(&self) -> usize;
 
-    /// Times of the last step (ms), by [`Stage`]; `None` where the engine does not report one.
-    fn stages(&self) -> [Option<f64>; Stage::ALL.len()];
+    /// Times of the last step, with the clocks on.
+    fn stages(&self) -> Stages;
 
-    /// Turns the clocks inside the step on or off, where that is possible.
-    fn set_timed(&mut self, on: bool);
+    /// Turns the clocks inside the step on or off, where that is possible: Box2D's always run, rapier's are chosen
+    /// when it is compiled.
+    fn set_timed(&mut self, _: bool) {}
 }
 
 /// A body after a step, in the precision of the engine.
@@ -36,61 +41,32 @@ pub struct State {
     pub angular_velocity: f32,
 }
 
-/// Parts of a step that all three engines have in some form.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    /// Bounds and new pairs. Box2D: `pairs`, `transforms` (poses and bounds), `refit`.
-    Pairs,
-    /// Narrow phase and impulse matching.
-    Collide,
-    /// Colors, lanes or islands. Box2D: `solverSetup`; its colors are maintained in `Collide`.
-    Color,
-    /// Constraint records.
-    Prepare,
-    /// Warm starting.
-    WarmStart,
-    /// Sweeps with position feedback.
-    Solve,
-    /// Sweeps without position feedback, and restitution.
-    Relax,
-    /// Velocities and positions of bodies.
-    Integrate,
-    /// The four stages above together: rapier reports only their sum.
-    Stages,
-    /// Storing impulses, writing poses back.
-    Store,
-}
+/// Parts of a step that all three engines have in some form: bounds and new pairs; narrow phase and impulse
+/// matching; colors, lanes or islands; constraint records; warm starting; sweeps with position feedback; sweeps
+/// without it and restitution; velocities and positions of bodies; the sum of the last four, which is all that
+/// rapier reports; storing impulses and writing poses back.
+pub const STAGES: [&str; 10] = [
+    "pairs",
+    "collide",
+    "color",
+    "prepare",
+    "warm start",
+    "solve",
+    "relax",
+    "integrate",
+    "= stages",
+    "store",
+];
+/// Index of the sum.
+pub const SUM: usize = 8;
 
-impl Stage {
-    /// Every stage, in the order of a step.
-    pub const ALL: [Stage; 10] = [
-        Stage::Pairs,
-        Stage::Collide,
-        Stage::Color,
-        Stage::Prepare,
-        Stage::WarmStart,
-        Stage::Solve,
-        Stage::Relax,
-        Stage::Integrate,
-        Stage::Stages,
-        Stage::Store,
-    ];
+/// Times by stage (ms); `None` where an engine does not report one.
+pub type Stages = [Option<f64>; STAGES.len()];
 
-    /// Column header.
-    pub fn name(self) -> &'static str {
-        match self {
-            Stage::Pairs => "pairs",
-            Stage::Collide => "collide",
-            Stage::Color => "color",
-            Stage::Prepare => "prepare",
-            Stage::WarmStart => "warm start",
-            Stage::Solve => "solve",
-            Stage::Relax => "relax",
-            Stage::Integrate => "integrate",
-            Stage::Stages => "= stages",
-            Stage::Store => "store",
-        }
-    }
+/// All stages, from those before the substeps, those in them and the last one (ms).
+pub fn stages_of(before: [f64; 4], within: [f64; 4], store: f64) -> Stages {
+    let [[a, b, c, d], [e, f, g, h]] = [before, within];
+    [a, b, c, d, e, f, g, h, e + f + g + h, store].map(Some)
 }
 
 /// Which engine, and its lane width.
@@ -123,6 +99,25 @@ pub struct Contender {
 }
 
 impl Contender {
+    /// An engine with this number of substeps and otherwise at its defaults, but for continuous collision.
+    pub const fn new(maker: Maker, substeps: u32, continuous: bool) -> Self {
+        Contender { maker, substeps, hertz: 30.0, recycling: true, continuous }
+    }
+
+    /// Whether this is an engine at its defaults in the race.
+    pub fn is_default(&self) -> bool {
+        *self == Contender::new(self.maker, 4, false)
+    }
+
+    /// Builds the scene in the engine. Errors: a part of the scene that the engine does not support.
+    pub fn build(&self, scene: &Scene) -> Result<Box<dyn Engine>, String> {
+        Ok(match self.maker {
+            Maker::Box2d => Box::new(Box2d::new(scene, self)?),
+            Maker::Rapier => Box::new(Rapier::new(scene, self)?),
+            Maker::Simpulse(..) | Maker::Solver(_) => Box::new(Simpulse::new(scene, self)?),
+        })
+    }
+
     /// Name in tables.
     pub fn name(&self) -> String {
         match self.maker {
@@ -147,30 +142,29 @@ impl Contender {
 /// broad phase of this crate run too, and the other engines without contact recycling.
 pub fn contenders(quick: bool) -> Vec<Contender> {
     let ours = |width| Maker::Simpulse(width, BroadPhaseKind::default());
+    let native = native_width();
+    let default = [(4, 30.0)];
+    let all_settings = [(2, 30.0), (4, 30.0), (8, 30.0), (8, 60.0)];
+    let every = if quick { &default[..] } else { &all_settings[..] };
     let mut all = Vec::new();
     let mut add = |maker, settings: &[(u32, f32)]| {
-        let contender =
-            |&(substeps, hertz)| Contender { maker, substeps, hertz, recycling: true, continuous: false };
-        all.extend(settings.iter().map(contender));
+        let of = |&(substeps, hertz)| Contender { hertz, ..Contender::new(maker, substeps, false) };
+        all.extend(settings.iter().map(of));
     };
-    let default = [(4, 30.0)];
-    let every = [(2, 30.0), (4, 30.0), (8, 30.0), (8, 60.0)];
-    let main = if quick { &default[..] } else { &every[..] };
-    add(Maker::Box2d, main);
-    add(Maker::Rapier, main);
-    let native = native_width();
-    add(ours(native), main);
-    let widths = if quick { &default[..] } else { &every[..3] };
+    for maker in [Maker::Box2d, Maker::Rapier, ours(native)] {
+        add(maker, every);
+    }
     for width in [LaneWidth::W16, LaneWidth::W8, LaneWidth::W4].into_iter().filter(|&w| w != native) {
-        add(ours(width), widths);
+        add(ours(width), &every[..every.len().min(3)]);
     }
     add(Maker::Simpulse(native, BroadPhaseKind::HashGrid), &default);
     // `shim` sets its contact frequencies itself. `box2d` and `rapier` are this crate's versions of those
     // engines' methods.
     add(Maker::Solver("shim"), &[(14, 30.0), (8, 30.0), (3, 30.0)]);
-    add(Maker::Solver("box2d"), &default);
-    add(Maker::Solver("rapier"), &default);
-    let anew = |maker| Contender { maker, substeps: 4, hertz: 30.0, recycling: false, continuous: false };
+    for name in ["box2d", "rapier"] {
+        add(Maker::Solver(name), &default);
+    }
+    let anew = |maker| Contender { recycling: false, ..Contender::new(maker, 4, false) };
     all.extend([Maker::Box2d, Maker::Rapier].map(anew));
     all
 }

@@ -17,7 +17,6 @@
 mod box2d;
 mod check;
 mod engine;
-mod longest;
 mod ours;
 mod picture;
 mod race;
@@ -28,7 +27,7 @@ mod torture;
 use clap::Parser;
 use simpulse::lab::torture::Campaign;
 use simpulse::lab::torture::families::Family;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Scenes of the race, their number of steps, and whether nothing in them may fall.
 const SCENES: &[(&str, u32, bool)] = &[
@@ -101,16 +100,14 @@ fn run(args: &Args) -> Result<(), String> {
     if let Some(scenes) = args.torture {
         let campaign = Campaign::new(args.seed.unwrap_or(1), &args.families, scenes);
         return match args.pace {
-            Some(repeats) => longest::compare(&campaign, repeats, args.log.as_deref()),
+            Some(repeats) => torture::compare(&campaign, repeats, args.log.as_deref()),
             None => torture::run(&campaign),
         };
     }
     let path = args.out.join("peers.csv");
     let failed = |e: csv::Error| format!("{}: {e}", path.display());
     if args.draw {
-        let rows: Result<Vec<table::Row>, _> =
-            csv::Reader::from_path(&path).map_err(failed)?.deserialize().collect();
-        return draw(&args.out, &rows.map_err(failed)?);
+        return draw(&args.out);
     }
     let row = |name: &str| SCENES.iter().copied().find(|s| s.0 == name);
     let scenes: Vec<(&str, u32, bool)> = match &args.scenes[..] {
@@ -122,8 +119,7 @@ fn run(args: &Args) -> Result<(), String> {
     std::fs::create_dir_all(&args.out).map_err(|e| format!("{}: {e}", args.out.display()))?;
     let mut csv = csv::Writer::from_path(&path).map_err(failed)?;
     let mut summary = vec![table::SUMMARY.to_string()];
-    let mut raced = Vec::new();
-    for (name, steps, stands) in scenes {
+    for (k, (name, steps, stands)) in scenes.into_iter().enumerate() {
         let steps = args.steps.unwrap_or(if args.quick { QUICK_STEPS } else { steps });
         let outcomes = race::race(name, args.seed, steps, args.repeats, stands, &contenders)?;
         println!("\n{name}: {} bodies, {steps} steps", outcomes[0].counts.0);
@@ -142,20 +138,25 @@ fn run(args: &Args) -> Result<(), String> {
             println!("  {line}");
         }
         summary.push(table::summary_line(name, &outcomes));
-        for outcome in &outcomes {
-            let row = table::Row::new(name, outcome);
-            csv.serialize(&row).map_err(failed)?;
-            raced.push(row);
+        for (i, outcome) in outcomes.iter().enumerate() {
+            let (names, values): (Vec<_>, Vec<_>) = table::row(name, outcome).into_iter().unzip();
+            if k + i == 0 {
+                csv.write_record(names).map_err(failed)?;
+            }
+            csv.write_record(values).map_err(failed)?;
         }
         csv.flush().map_err(|e| format!("{}: {e}", path.display()))?;
     }
     println!("\n{}\n\n{}", summary.join("\n"), path.display());
-    draw(&args.out, &raced)
+    draw(&args.out)
 }
 
-fn draw(out: &std::path::Path, rows: &[table::Row]) -> Result<(), String> {
-    let path = out.join("peers.svg");
-    std::fs::write(&path, picture::svg(rows)?).map_err(|e| format!("{}: {e}", path.display()))?;
-    println!("{}", path.display());
+/// Draws peers.svg from the peers.csv in the folder.
+fn draw(out: &Path) -> Result<(), String> {
+    let [csv, svg] = ["peers.csv", "peers.svg"].map(|name| out.join(name));
+    let rows = csv::Reader::from_path(&csv).and_then(|mut rows| rows.deserialize().collect());
+    let rows: Vec<picture::Row> = rows.map_err(|e: csv::Error| format!("{}: {e}", csv.display()))?;
+    std::fs::write(&svg, picture::svg(&rows)?).map_err(|e| format!("{}: {e}", svg.display()))?;
+    println!("{}", svg.display());
     Ok(())
 }

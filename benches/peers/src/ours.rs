@@ -1,10 +1,8 @@
 //! This crate's `soft_step`, a schedule that the other two engines have as well, and its other solvers at
 //! their own settings.
 
-use crate::engine::{Contender, Engine, Stage, State};
-use simpulse::engine::broadphase::BroadPhaseKind;
+use crate::engine::{Contender, Engine, Maker, Stages, State, stages_of};
 use simpulse::engine::clock::Phase;
-use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers;
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes::Scene;
@@ -13,28 +11,17 @@ use simpulse::lab::scenes::Scene;
 pub struct Simpulse(World);
 
 impl Simpulse {
-    /// Runs `soft_step`. Errors: an invalid scene.
-    pub fn soft_step(
-        scene: &Scene,
-        contender: &Contender,
-        width: LaneWidth,
-        broadphase: BroadPhaseKind,
-    ) -> Result<Self, String> {
-        let solver = solvers::find("soft_step").map_err(|e| e.to_string())?;
-        let continuous = contender.continuous;
-        let mut settings = Settings { broadphase, continuous, ..Settings::new(solver).exactly(width) };
-        let set = solver.set(&mut settings.parameters, "contact_hertz", contender.hertz);
-        set.map_err(|e| e.to_string())?;
-        settings.budget.substeps = contender.substeps;
-        Ok(Simpulse(scene.build(settings).map_err(|e| e.to_string())?))
-    }
-
-    /// Runs another solver at its own settings; it uses fewer lanes where a scene cannot fill them. Errors: as above, or
-    /// an unknown solver.
-    pub fn of(scene: &Scene, name: &str, contender: &Contender) -> Result<Self, String> {
+    /// Errors: an invalid scene or an unknown solver.
+    pub fn new(scene: &Scene, contender: &Contender) -> Result<Self, String> {
+        let name = if let Maker::Solver(name) = contender.maker { name } else { "soft_step" };
         let solver = solvers::find(name).map_err(|e| e.to_string())?;
         let mut settings = Settings { continuous: contender.continuous, ..Settings::new(solver) };
         settings.budget.substeps = contender.substeps;
+        if let Maker::Simpulse(width, broadphase) = contender.maker {
+            settings = Settings { broadphase, ..settings.exactly(width) };
+            let set = solver.set(&mut settings.parameters, "contact_hertz", contender.hertz);
+            set.map_err(|e| e.to_string())?;
+        }
         Ok(Simpulse(scene.build(settings).map_err(|e| e.to_string())?))
     }
 }
@@ -62,31 +49,12 @@ impl Engine for Simpulse {
         self.0.counts.points
     }
 
-    fn stages(&self) -> [Option<f64>; Stage::ALL.len()] {
-        let sum = |phases: &[Phase]| {
-            phases.iter().map(|&p| self.0.timings.phase_ns[p as usize] as f64).sum::<f64>() * 1e-6
-        };
-        Stage::ALL.map(|stage| {
-            Some(sum(match stage {
-                Stage::Pairs => &[Phase::Pairs],
-                Stage::Collide => &[Phase::Collide],
-                Stage::Color => &[Phase::Color],
-                Stage::Prepare => &[Phase::Prepare],
-                Stage::WarmStart => &[Phase::WarmStart],
-                Stage::Solve => &[Phase::Solve, Phase::Position],
-                Stage::Relax => &[Phase::Relax, Phase::Restitution],
-                Stage::Integrate => &[Phase::Integrate],
-                Stage::Stages => &[
-                    Phase::WarmStart,
-                    Phase::Solve,
-                    Phase::Position,
-                    Phase::Relax,
-                    Phase::Restitution,
-                    Phase::Integrate,
-                ],
-                Stage::Store => &[Phase::Store],
-            }))
-        })
+    fn stages(&self) -> Stages {
+        let of = |phase: Phase| self.0.timings.phase_ns[phase as usize] as f64 * 1e-6;
+        let before = [Phase::Pairs, Phase::Collide, Phase::Color, Phase::Prepare].map(of);
+        let solve = of(Phase::Solve) + of(Phase::Position);
+        let relax = of(Phase::Relax) + of(Phase::Restitution);
+        stages_of(before, [of(Phase::WarmStart), solve, relax, of(Phase::Integrate)], of(Phase::Store))
     }
 
     fn set_timed(&mut self, on: bool) {

@@ -3,13 +3,26 @@
 //! Both axes are logarithmic; lower left is better. A setting that failed the check has no time and no point:
 //! it is listed below its panel.
 
-use crate::table::Row;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
+use serde::Deserialize;
 use simpulse::lab::picture::axes::{
     Area, Drawn, Edges, INK, LogScale, color, marker, with_dark, wrapped, write, write_upwards,
 };
 use simpulse::lab::report::units::si_short;
+
+/// What is drawn of a row of `peers.csv`.
+#[derive(Debug, Deserialize)]
+pub struct Row {
+    scene: String,
+    engine: String,
+    substeps: u32,
+    contact_hertz: f32,
+    recycling: bool,
+    failed: String,
+    mean_step_ms: Option<f64>,
+    penetration_mean_m: Option<f64>,
+}
 
 const COLUMNS: usize = 3;
 const PANEL: (i32, i32) = (360, 300);

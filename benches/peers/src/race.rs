@@ -7,26 +7,14 @@
 //! runs: the sum over the steps that were timed for both contenders. It includes spikes, and the longest step
 //! is printed next to it. The last second of the first run is not timed: it is used for the check.
 
-use crate::box2d::Box2d;
 use crate::check::{Checker, Errors, WINDOW};
-use crate::engine::{Contender, Engine, Maker, Stage};
-use crate::ours::Simpulse;
-use crate::rapier::Rapier;
+use crate::engine::{Contender, Engine, Maker, SUM, Stages};
 use simpulse::engine::clock::waited;
 use simpulse::engine::lanes::native_width;
 use simpulse::lab::scenes::{self, Scene};
+use simpulse::lab::study::sample::quantile;
 use std::ops::Range;
 use std::time::Instant;
-
-/// Builds the scene in the contender's engine. Errors: a part of the scene that the engine does not support.
-pub fn build(contender: &Contender, scene: &Scene) -> Result<Box<dyn Engine>, String> {
-    Ok(match contender.maker {
-        Maker::Box2d => Box::new(Box2d::new(scene, contender)?),
-        Maker::Rapier => Box::new(Rapier::new(scene, contender)?),
-        Maker::Simpulse(width, pairs) => Box::new(Simpulse::soft_step(scene, contender, width, pairs)?),
-        Maker::Solver(name) => Box::new(Simpulse::of(scene, name, contender)?),
-    })
-}
 
 /// Steps of a block.
 const BLOCK: u32 = 10;
@@ -46,7 +34,7 @@ pub struct Steps {
     /// Mean.
     pub mean: f64,
     /// Quartiles.
-    pub quartiles: Quartiles,
+    pub quartiles: [f64; 3],
     /// Longest step.
     pub longest: f64,
 }
@@ -55,10 +43,14 @@ impl Steps {
     /// From the time of each step; NaN where a step was not timed.
     fn of(steps: &[f64]) -> Option<Self> {
         let timed: Vec<f64> = steps.iter().copied().filter(|ms| ms.is_finite()).collect();
-        let (mean, longest) =
-            (timed.iter().sum::<f64>() / timed.len() as f64, timed.iter().copied().fold(0.0, f64::max));
-        Some(Steps { mean, quartiles: Quartiles::of(timed)?, longest })
+        let mean = timed.iter().sum::<f64>() / timed.len() as f64;
+        Some(Steps { mean, quartiles: quartiles(&timed)?, longest: quantile(&timed, 1.0) })
     }
+}
+
+/// Quartiles of a sample; `None` if it is empty.
+fn quartiles(sample: &[f64]) -> Option<[f64; 3]> {
+    (!sample.is_empty()).then(|| [0.25, 0.5, 0.75].map(|p| quantile(sample, p)))
 }
 
 /// Time of one whole run relative to another, over the steps that were timed in both.
@@ -75,29 +67,6 @@ fn blocks(steps: u32, repeat: u32) -> impl Iterator<Item = Range<u32>> {
     starts
         .take_while(move |&start| start < steps)
         .map(move |start| start..if start < first { first } else { start + BLOCK }.min(steps))
-}
-
-/// Quartiles of a sample.
-#[derive(Clone, Copy, Debug)]
-pub struct Quartiles {
-    /// First quartile.
-    pub low: f64,
-    /// Median.
-    pub median: f64,
-    /// Third quartile.
-    pub high: f64,
-}
-
-impl Quartiles {
-    /// Quartiles of a sample; `None` if it is empty.
-    pub fn of(mut sample: Vec<f64>) -> Option<Self> {
-        sample.sort_by(f64::total_cmp);
-        let at = |share: f64| sample.get((share * (sample.len() - 1) as f64).round() as usize).copied();
-        if sample.is_empty() {
-            return None;
-        }
-        Some(Quartiles { low: at(0.25)?, median: at(0.5)?, high: at(0.75)? })
-    }
 }
 
 /// Result of one contender in one scene.
@@ -119,14 +88,14 @@ pub struct Outcome {
     /// Time of the whole run relative to `soft_step` at the width of the CPU and with as many substeps.
     pub ratio: Option<f64>,
     /// The same ratio block by block, for warm start, solve, relax and integrate alone.
-    pub stages_ratio: Option<Quartiles>,
+    pub stages_ratio: Option<[f64; 3]>,
 }
 
 /// Times of a step by stage (ms). All are of the same steps, so that they add up.
 #[derive(Clone, Copy, Debug)]
 pub struct Breakdown {
-    /// By [`Stage`]; `None` where the engine does not report it.
-    pub stages: [Option<f64>; Stage::ALL.len()],
+    /// By stage.
+    pub stages: Stages,
     /// Time of the whole step.
     pub step: f64,
 }
@@ -135,10 +104,9 @@ impl Breakdown {
     /// Mean of a sample; `None` if it is empty.
     fn mean(sample: &[Self]) -> Option<Self> {
         let count = sample.len() as f64;
-        let mean =
-            |of: &dyn Fn(&Self) -> Option<f64>| Some(sample.iter().map(of).sum::<Option<f64>>()? / count);
-        let stages = std::array::from_fn(|k| mean(&|b| b.stages[k]));
-        Some(Breakdown { stages, step: mean(&|b| Some(b.step)).filter(|_| count > 0.0)? })
+        let stage = |k| Some(sample.iter().map(|b: &Self| b.stages[k]).sum::<Option<f64>>()? / count);
+        let step = sample.iter().map(|b| b.step).sum::<f64>() / count;
+        (count > 0.0).then(|| Breakdown { stages: std::array::from_fn(stage), step })
     }
 
     /// Mean of the faster half of a block, which excludes interrupted steps.
@@ -152,6 +120,8 @@ impl Breakdown {
 struct Runner {
     contender: Contender,
     engine: Box<dyn Engine>,
+    counts: (usize, usize),
+    errors: Option<Errors>,
     failed: Option<String>,
     /// Times (ms), `[repeat][step]`; NaN where a step was not timed.
     steps: Vec<Vec<f64>>,
@@ -182,25 +152,23 @@ pub fn race(
     let rounds = steps.saturating_sub(WINDOW) / BLOCK;
     let mut runners = Vec::new();
     for &contender in contenders {
-        let engine = build(&contender, &scene).map_err(|e| format!("{}: {e}", contender.name()))?;
+        let engine = contender.build(&scene).map_err(|e| format!("{}: {e}", contender.name()))?;
         runners.push(Runner {
             contender,
             engine,
+            counts: (0, 0),
+            errors: None,
             failed: None,
             steps: Vec::new(),
             waited_and_ran: [0.0; 2],
             clocked: Vec::new(),
         });
     }
-    let mut errors = Vec::new();
-    let mut counts = Vec::new();
     for repeat in 0..repeats {
-        if repeat > 0 {
-            for runner in &mut runners {
-                runner.engine = build(&runner.contender, &scene)?;
-            }
-        }
         for runner in &mut runners {
+            if repeat > 0 {
+                runner.engine = runner.contender.build(&scene)?;
+            }
             runner.steps.push(vec![f64::NAN; steps as usize]);
         }
         let timed = if repeat == 0 { rounds * BLOCK } else { steps };
@@ -213,53 +181,47 @@ pub fn race(
         // Runs are deterministic, so one check is enough. It comes before any time is used.
         if repeat == 0 {
             for runner in &mut runners {
-                errors.push(runner.check(Checker::new(load()?)?, steps - rounds * BLOCK, stands));
-                counts.push((runner.engine.bodies(), runner.engine.points()));
+                runner.check(Checker::new(load()?)?, steps - rounds * BLOCK, stands);
             }
         }
     }
-    let rivals: Vec<Option<usize>> = contenders.iter().map(|c| rival(contenders, c)).collect();
-    let outcome = |(i, (errors, counts)): (usize, (Option<Errors>, (usize, usize)))| {
-        let runner = &runners[i];
-        let timed = runner.failed.is_none();
-        let against = |of: fn(&Runner) -> Vec<f64>| {
-            let rival = &runners[rivals[i]?];
-            if rival.failed.is_some() || !timed {
-                return None;
-            }
-            Some([of(runner), of(rival)])
-        };
-        let by_block = |[a, b]: [Vec<f64>; 2]| Quartiles::of(a.iter().zip(b).map(|(a, b)| a / b).collect());
-        let [waits, ran] = runner.waited_and_ran;
-        let stages = |r: &Runner| r.clocked.iter().filter_map(|b| b.stages[Stage::Stages as usize]).collect();
-        Outcome {
-            contender: runner.contender,
-            counts,
-            step: Steps::of(&runner.medians()).filter(|_| timed),
-            waited: waits / (waits + ran).max(1e-9),
-            stages: Breakdown::mean(&runner.clocked).filter(|_| timed),
-            ratio: against(Runner::medians).and_then(|[a, b]| whole(&a, &b)),
-            stages_ratio: against(stages).and_then(by_block),
-            errors,
-            failed: runner.failed.clone(),
-        }
-    };
-    Ok(errors.into_iter().zip(counts).enumerate().map(outcome).collect())
-}
-
-/// Index of `soft_step` at the width of the CPU and at the same settings, with default options.
-fn rival(contenders: &[Contender], of: &Contender) -> Option<usize> {
-    let maker = Maker::Simpulse(native_width(), Default::default());
-    contenders.iter().position(|c| *c == Contender { maker, recycling: true, ..*of })
+    Ok(runners.iter().map(|runner| runner.outcome(&runners)).collect())
 }
 
 impl Runner {
+    /// The result, relative to `soft_step` at the width of the CPU and at the same settings, with default options.
+    fn outcome(&self, all: &[Runner]) -> Outcome {
+        let timed = self.failed.is_none();
+        let maker = Maker::Simpulse(native_width(), Default::default());
+        let rival = Contender { maker, recycling: true, ..self.contender };
+        let rival = all.iter().find(|r| r.contender == rival && r.failed.is_none()).filter(|_| timed);
+        let stages =
+            |r: &Runner| -> Vec<f64> { r.clocked.iter().filter_map(|block| block.stages[SUM]).collect() };
+        let by_block = |rival: &Runner| -> Vec<f64> {
+            stages(self).iter().zip(stages(rival)).map(|(a, b)| a / b).collect()
+        };
+        let [waits, ran] = self.waited_and_ran;
+        Outcome {
+            contender: self.contender,
+            counts: self.counts,
+            step: Steps::of(&self.medians()).filter(|_| timed),
+            waited: waits / (waits + ran).max(1e-9),
+            stages: Breakdown::mean(&self.clocked).filter(|_| timed),
+            ratio: rival.and_then(|rival| whole(&self.medians(), &rival.medians())),
+            stages_ratio: rival.and_then(|rival| quartiles(&by_block(rival))),
+            errors: self.errors.clone(),
+            failed: self.failed.clone(),
+        }
+    }
+
     /// Median over the repeats for each step; NaN where no repeat timed it.
     fn medians(&self) -> Vec<f64> {
         let count = self.steps.first().map_or(0, Vec::len);
-        let repeats =
-            |step: usize| self.steps.iter().map(|run| run[step]).filter(|ms| ms.is_finite()).collect();
-        (0..count).map(|step| Quartiles::of(repeats(step)).map_or(f64::NAN, |q| q.median)).collect()
+        let median = |step: usize| {
+            let timed = self.steps.iter().map(|run| run[step]).filter(|ms| ms.is_finite());
+            quartiles(&timed.collect::<Vec<_>>()).map_or(f64::NAN, |q| q[1])
+        };
+        (0..count).map(median).collect()
     }
 
     /// Runs the steps of a block of the last repeat.
@@ -306,24 +268,21 @@ impl Runner {
         }
     }
 
-    /// Runs the last `left` steps and checks the last second. Returns the errors, unless the engine diverges.
-    fn check(&mut self, mut checker: Checker, left: u32, stands: bool) -> Option<Errors> {
-        if self.failed.is_some() {
-            return None;
-        }
+    /// Runs the last `left` steps and checks the last second.
+    fn check(&mut self, mut checker: Checker, left: u32, stands: bool) {
         self.engine.set_timed(false);
-        for left in (0..left).rev() {
-            let seen = match self.engine.step() {
-                Ok(()) if left < WINDOW => checker.observe(&*self.engine, left),
-                stepped => stepped,
-            };
-            if let Err(message) = seen {
-                self.failed = Some(message);
-                return None;
+        let mut observe = |left: u32| match self.engine.step() {
+            Ok(()) if left < WINDOW => checker.observe(&*self.engine, left),
+            stepped => stepped,
+        };
+        if self.failed.is_none() {
+            self.failed = (0..left).rev().try_for_each(&mut observe).err();
+            if self.failed.is_none() {
+                let errors = checker.finish();
+                self.failed = errors.verdict(stands).err();
+                self.errors = Some(errors);
             }
         }
-        let errors = checker.finish();
-        self.failed = errors.verdict(stands).err();
-        Some(errors)
+        self.counts = (self.engine.bodies(), self.engine.points());
     }
 }

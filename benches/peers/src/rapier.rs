@@ -1,6 +1,6 @@
 //! rapier2d.
 
-use crate::engine::{Contender, Engine, Stage, State};
+use crate::engine::{Contender, Engine, SUM, Stages, State};
 use rapier2d::prelude::*;
 use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::joints::JointKind;
@@ -171,21 +171,17 @@ impl Engine for Rapier {
         pairs.flat_map(|p| p.solver_manifolds()).map(|m| m.data.solver_contacts.len()).sum()
     }
 
-    fn stages(&self) -> [Option<f64>; Stage::ALL.len()] {
+    fn stages(&self) -> Stages {
         let c = &self.world.physics_pipeline.counters;
-        Stage::ALL.map(|stage| {
-            let ms = match stage {
-                Stage::Pairs => c.cd.broad_phase_time.time_ms() + c.cd.final_broad_phase_time.time_ms(),
-                Stage::Collide => c.cd.narrow_phase_time.time_ms(),
-                Stage::Color => c.stages.island_construction_time.time_ms(),
-                Stage::Prepare => c.solver.velocity_assembly_time.time_ms(),
-                Stage::Stages => c.solver.velocity_resolution_time.time_ms(),
-                _ => return None,
-            };
-            cfg!(feature = "rapier-phases").then_some(ms)
-        })
+        let mut stages = Stages::default();
+        if cfg!(feature = "rapier-phases") {
+            let pairs = c.cd.broad_phase_time.time_ms() + c.cd.final_broad_phase_time.time_ms();
+            stages[0] = Some(pairs);
+            stages[1] = Some(c.cd.narrow_phase_time.time_ms());
+            stages[2] = Some(c.stages.island_construction_time.time_ms());
+            stages[3] = Some(c.solver.velocity_assembly_time.time_ms());
+            stages[SUM] = Some(c.solver.velocity_resolution_time.time_ms());
+        }
+        stages
     }
-
-    /// Clocks are chosen when rapier is compiled.
-    fn set_timed(&mut self, _: bool) {}
 }

@@ -1,9 +1,9 @@
 //! Human-readable tables, and rows of `peers.csv`.
 
-use crate::engine::{Maker, Stage};
-use crate::race::{Outcome, Quartiles, Steps};
+use crate::check::Errors;
+use crate::engine::{STAGES, SUM};
+use crate::race::{Outcome, Steps};
 use comfy_table::{Table, presets::UTF8_FULL_CONDENSED};
-use serde::{Deserialize, Serialize};
 
 const NONE: &str = "–";
 
@@ -38,9 +38,9 @@ pub fn comparison(outcomes: &[Outcome]) -> Table {
             o.contender.name(),
             o.contender.setting(),
             ms(o, |s| s.mean),
-            ms(o, |s| s.quartiles.median),
+            ms(o, |s| s.quartiles[1]),
             o.step.map_or(NONE.into(), |s| {
-                format!("{}–{}", significant(s.quartiles.low), significant(s.quartiles.high))
+                format!("{}–{}", significant(s.quartiles[0]), significant(s.quartiles[2]))
             }),
             ms(o, |s| s.longest),
             o.ratio.map_or(NONE.into(), |ratio| format!("{ratio:.2}")),
@@ -71,33 +71,31 @@ pub fn comparison(outcomes: &[Outcome]) -> Table {
 
 /// Time by stage at four substeps (ms per step).
 pub fn stages(outcomes: &[Outcome]) -> Table {
-    let names: Vec<&str> = Stage::ALL.iter().map(|s| s.name()).collect();
-    let mut table = head(&[&["engine"], &names[..], &["rest", "step"]].concat());
+    let mut table = head(&[&["engine"], &STAGES[..], &["rest", "step"]].concat());
     for o in outcomes.iter().filter(|o| o.contender.substeps == 4) {
         let Some(b) = &o.stages else { continue };
         let anew = if o.contender.recycling { "" } else { ", no recycling" };
         let mut row = vec![o.contender.name() + anew];
         row.extend(b.stages.map(|ms| ms.map_or(NONE.into(), significant)));
-        // The stages from warm start to integrate add up to `Stages`, which is in the list itself.
-        let apart = [Stage::WarmStart, Stage::Solve, Stage::Relax, Stage::Integrate];
-        let counted = Stage::ALL.iter().filter(|s| !apart.contains(s));
-        let told: f64 = counted.filter_map(|&s| b.stages[s as usize]).sum();
-        let tells = b.stages[Stage::Stages as usize].is_some();
-        row.push(if tells { significant(b.step - told) } else { NONE.into() });
+        // The four stages before the sum are part of it.
+        let counted = [&b.stages[..SUM - 4], &b.stages[SUM..]].concat();
+        let rest = b.step - counted.iter().flatten().sum::<f64>();
+        row.push(b.stages[SUM].map_or(NONE.into(), |_| significant(rest)));
         row.push(significant(b.step));
         table.add_row(row);
     }
     table
 }
 
+/// The outcome of an engine at its defaults, whose name begins with `family`.
+fn default<'o>(outcomes: &'o [Outcome], family: &str) -> Option<&'o Outcome> {
+    outcomes.iter().find(|o| o.contender.is_default() && o.contender.name().starts_with(family))
+}
+
 /// The fastest setting of every engine whose errors are no larger than those of Box2D at its defaults: the
 /// mean overlap, the joint gap and, in scenes that stand, the residual velocity.
 pub fn equal_errors(outcomes: &[Outcome], stands: bool) -> Vec<String> {
-    let default = |o: &&Outcome| {
-        let c = &o.contender;
-        c.maker == Maker::Box2d && c.substeps == 4 && c.hertz == 30.0 && c.recycling
-    };
-    let Some(bound) = outcomes.iter().find(default).and_then(|o| o.errors.as_ref()) else {
+    let Some(bound) = default(outcomes, "Box2D").and_then(|o| o.errors.as_ref()) else {
         return Vec::new();
     };
     let mut lines = Vec::new();
@@ -128,16 +126,10 @@ pub fn equal_errors(outcomes: &[Outcome], stands: bool) -> Vec<String> {
 /// simpulse at the width of the CPU. Columns: ratios of whole runs, longest steps, and errors of the last
 /// second.
 pub fn summary_line(scene: &str, outcomes: &[Outcome]) -> String {
-    let of = |family: &str| {
-        outcomes.iter().find(|o| {
-            let c = &o.contender;
-            o.contender.name().starts_with(family) && c.substeps == 4 && c.hertz == 30.0 && c.recycling
-        })
-    };
-    let engines = ["simpulse", "Box2D", "rapier"].map(of);
+    let engines = ["simpulse", "Box2D", "rapier"].map(|family| default(outcomes, family));
     let [ours, box2d, rapier] = engines;
     let cell = |o: Option<&Outcome>, of: fn(&Outcome) -> String| o.map_or(NONE.into(), of);
-    let errors = |of: fn(&crate::check::Errors) -> f64| {
+    let errors = |of: fn(&Errors) -> f64| {
         let one = |o: Option<&Outcome>| {
             let errors = o.filter(|o| o.failed.is_none()).and_then(|o| o.errors.as_ref());
             errors.map_or("fails".into(), |e| significant(1e3 * of(e)))
@@ -164,99 +156,61 @@ pub const SUMMARY: &str = "\
 | scene | simpulse ms | Box2D × | its stages × | rapier × | longest step ms s / B / r | mean overlap mm s / B / r | max overlap mm s / B / r | rms velocity mm/s s / B / r | gap of joints mm s / B / r |
 |---|---|---|---|---|---|---|---|---|---|";
 
-/// A row of `peers.csv`.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Row {
-    pub scene: String,
-    pub engine: String,
-    pub substeps: u32,
-    pub contact_hertz: f32,
-    pub recycling: bool,
-    pub failed: String,
-    pub mean_step_ms: Option<f64>,
-    median_step_ms: Option<f64>,
-    quartile_1_ms: Option<f64>,
-    quartile_3_ms: Option<f64>,
-    longest_step_ms: Option<f64>,
-    waited_share: f64,
-    whole_run_ratio: Option<f64>,
-    stages_ratio: Option<f64>,
-    clocked_step_ms: Option<f64>,
-    pairs_ms: Option<f64>,
-    collide_ms: Option<f64>,
-    color_ms: Option<f64>,
-    prepare_ms: Option<f64>,
-    warm_start_ms: Option<f64>,
-    solve_ms: Option<f64>,
-    relax_ms: Option<f64>,
-    integrate_ms: Option<f64>,
-    stages_ms: Option<f64>,
-    store_ms: Option<f64>,
-    bodies: usize,
-    points: usize,
-    pairs: Option<usize>,
-    pub penetration_mean_m: Option<f64>,
-    penetration_max_m: Option<f64>,
-    lost_pairs: Option<f64>,
-    rms_velocity_m_s: Option<f64>,
-    #[serde(default)]
-    gap_rms_m: Option<f64>,
-    #[serde(default)]
-    gap_max_m: Option<f64>,
-    top_m: Option<f64>,
-    reference: String,
-    reference_unit: String,
-    reference_error: Option<f64>,
-}
-
-impl Row {
-    /// All values of an outcome; no times if the check failed.
-    pub fn new(scene: &str, o: &Outcome) -> Self {
-        let e = o.errors.as_ref();
-        let [pairs, collide, color, prepare, warm_start, solve, relax, integrate, stages, store] =
-            o.stages.map_or([None; Stage::ALL.len()], |b| b.stages);
-        let truth = e.and_then(|e| e.truth);
-        Row {
-            scene: scene.into(),
-            engine: o.contender.name(),
-            substeps: o.contender.substeps,
-            contact_hertz: o.contender.hertz,
-            recycling: o.contender.recycling,
-            failed: o.failed.clone().unwrap_or_default(),
-            mean_step_ms: o.step.map(|s| s.mean),
-            median_step_ms: o.step.map(|s| s.quartiles.median),
-            quartile_1_ms: o.step.map(|s| s.quartiles.low),
-            quartile_3_ms: o.step.map(|s| s.quartiles.high),
-            longest_step_ms: o.step.map(|s| s.longest),
-            waited_share: o.waited,
-            whole_run_ratio: o.ratio,
-            stages_ratio: o.stages_ratio.map(|q| q.median),
-            clocked_step_ms: o.stages.map(|b| b.step),
-            pairs_ms: pairs,
-            collide_ms: collide,
-            color_ms: color,
-            prepare_ms: prepare,
-            warm_start_ms: warm_start,
-            solve_ms: solve,
-            relax_ms: relax,
-            integrate_ms: integrate,
-            stages_ms: stages,
-            store_ms: store,
-            bodies: o.counts.0,
-            points: o.counts.1,
-            pairs: e.map(|e| e.pairs),
-            penetration_mean_m: e.map(|e| e.penetration_mean),
-            penetration_max_m: e.map(|e| e.penetration_max),
-            lost_pairs: e.map(|e| e.lost),
-            rms_velocity_m_s: e.map(|e| e.rms_velocity),
-            gap_rms_m: e.and_then(|e| Some(e.gap?[0])),
-            gap_max_m: e.and_then(|e| Some(e.gap?[1])),
-            top_m: e.map(|e| e.top),
-            reference: truth.map_or("", |t| t.0).into(),
-            reference_unit: truth.map_or("", |t| t.1).into(),
-            reference_error: truth.map(|t| t.2),
-        }
-    }
+/// A row of `peers.csv`: every column with its value, empty if there is none. No times if the check failed.
+pub fn row(scene: &str, o: &Outcome) -> Vec<(&'static str, String)> {
+    let number = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
+    let step = |of: fn(&Steps) -> f64| number(o.step.as_ref().map(of));
+    let error = |of: fn(&Errors) -> Option<f64>| number(o.errors.as_ref().and_then(of));
+    let truth = o.errors.as_ref().and_then(|e| e.truth);
+    let c = &o.contender;
+    let mut row = vec![
+        ("scene", scene.to_string()),
+        ("engine", c.name()),
+        ("substeps", c.substeps.to_string()),
+        ("contact_hertz", format!("{:?}", c.hertz)),
+        ("recycling", c.recycling.to_string()),
+        ("failed", o.failed.clone().unwrap_or_default()),
+        ("mean_step_ms", step(|s| s.mean)),
+        ("median_step_ms", step(|s| s.quartiles[1])),
+        ("quartile_1_ms", step(|s| s.quartiles[0])),
+        ("quartile_3_ms", step(|s| s.quartiles[2])),
+        ("longest_step_ms", step(|s| s.longest)),
+        ("waited_share", o.waited.to_string()),
+        ("whole_run_ratio", number(o.ratio)),
+        ("stages_ratio", number(o.stages_ratio.map(|q| q[1]))),
+        ("clocked_step_ms", number(o.stages.map(|b| b.step))),
+    ];
+    const NAMES: [&str; STAGES.len()] = [
+        "pairs_ms",
+        "collide_ms",
+        "color_ms",
+        "prepare_ms",
+        "warm_start_ms",
+        "solve_ms",
+        "relax_ms",
+        "integrate_ms",
+        "stages_ms",
+        "store_ms",
+    ];
+    row.extend(
+        NAMES.into_iter().enumerate().map(|(k, name)| (name, number(o.stages.and_then(|b| b.stages[k])))),
+    );
+    row.extend([
+        ("bodies", o.counts.0.to_string()),
+        ("points", o.counts.1.to_string()),
+        ("pairs", error(|e| Some(e.pairs as f64))),
+        ("penetration_mean_m", error(|e| Some(e.penetration_mean))),
+        ("penetration_max_m", error(|e| Some(e.penetration_max))),
+        ("lost_pairs", error(|e| Some(e.lost))),
+        ("rms_velocity_m_s", error(|e| Some(e.rms_velocity))),
+        ("gap_rms_m", error(|e| Some(e.gap?[0]))),
+        ("gap_max_m", error(|e| Some(e.gap?[1]))),
+        ("top_m", error(|e| Some(e.top))),
+        ("reference", truth.map_or(String::new(), |t| t.0.into())),
+        ("reference_unit", truth.map_or(String::new(), |t| t.1.into())),
+        ("reference_error", number(truth.map(|t| t.2))),
+    ]);
+    row
 }
 
 /// An empty table with these columns.
@@ -280,6 +234,6 @@ fn significant(x: f64) -> String {
     format!("{x:.*}", digits as usize)
 }
 
-fn factor(q: &Option<Quartiles>) -> String {
-    q.map_or(NONE.into(), |q| format!("{:.2} [{:.2}, {:.2}]", q.median, q.low, q.high))
+fn factor(q: &Option<[f64; 3]>) -> String {
+    q.map_or(NONE.into(), |[low, median, high]| format!("{median:.2} [{low:.2}, {high:.2}]"))
 }

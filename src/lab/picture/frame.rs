@@ -7,6 +7,7 @@ use crate::engine::shapes::Shape;
 use crate::engine::world::World;
 use crate::lab::metrics::overlaps::Overlaps;
 use glam::{DVec2, Vec2};
+use std::collections::BTreeMap;
 
 /// Data that does not change while a world runs.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,54 +90,34 @@ impl Frame {
     }
 }
 
-/// Points at the current geometry, with the impulses of the last step if the same features touched in it.
+/// Points at the current geometry, with the impulses of the last step if the same features touched in it; then
+/// those that have separated since.
 fn touch_points(world: &World, poses: &[[f64; 3]], overlaps: &mut Overlaps) -> Vec<TouchPoint> {
-    let mut points = Vec::new();
-    let mut contacts = world.contacts.iter().peekable();
-    let from = |body: u32, anchor: Vec2| {
-        let [x, y, _] = poses[body as usize];
-        [x + f64::from(anchor.x), y + f64::from(anchor.y)]
+    let point = |bodies: [u32; 2], anchor_b: Vec2, normal: Vec2, separation, impulse| {
+        let [x, y, _] = poses[bodies[1] as usize];
+        let at = [x + f64::from(anchor_b.x), y + f64::from(anchor_b.y)];
+        TouchPoint { bodies, at, normal: normal.to_array(), separation, impulse }
     };
-    let part = |points: &mut Vec<TouchPoint>, contact: &crate::engine::contacts::Contact, found: &[u32]| {
-        for (point, impulse) in contact.manifold.points().iter().zip(contact.step_impulse) {
-            if !found.contains(&point.feature_id) && impulse != [0.0; 2] {
-                points.push(TouchPoint {
-                    bodies: [contact.body_a, contact.body_b],
-                    at: from(contact.body_b, point.anchor_b),
-                    normal: contact.manifold.normal.to_array(),
-                    separation: 0.0,
-                    impulse,
-                });
+    let mut solved = BTreeMap::new();
+    for contact in &world.contacts {
+        let (bodies, normal) = ([contact.body_a, contact.body_b], contact.manifold.normal);
+        for (p, impulse) in contact.manifold.points().iter().zip(contact.step_impulse) {
+            if impulse != [0.0; 2] {
+                let name = (contact.key(), p.feature_id);
+                solved.insert(name, point(bodies, p.anchor_b, normal, 0.0, impulse));
             }
         }
-    };
-    // Pairs and contacts are sorted alike.
+    }
+    let mut points = Vec::new();
     overlaps.find(world, |[a, b], manifold| {
-        while let Some(contact) = contacts.next_if(|c| c.key() < pair_key(a, b)) {
-            part(&mut points, contact, &[]);
-        }
-        let known = contacts.next_if(|c| c.key() == pair_key(a, b));
         let bodies = [a, b].map(|shape| world.shape_body[shape as usize]);
-        let mut found = Vec::new();
-        for point in manifold.points() {
-            found.push(point.feature_id);
-            let own = known.map(|c| (c.manifold, c.step_impulse));
-            let impulse = own.and_then(|(old, impulses)| {
-                old.points().iter().position(|p| p.feature_id == point.feature_id).map(|i| impulses[i])
-            });
-            points.push(TouchPoint {
-                bodies,
-                at: from(bodies[1], point.anchor_b),
-                normal: manifold.normal.to_array(),
-                separation: point.separation,
-                impulse: impulse.unwrap_or_default(),
-            });
-        }
-        if let Some(contact) = known {
-            part(&mut points, contact, &found);
+        for p in manifold.points() {
+            let known = solved.remove(&(pair_key(a, b), p.feature_id));
+            let impulse = known.map_or([0.0; 2], |known| known.impulse);
+            points.push(point(bodies, p.anchor_b, manifold.normal, p.separation, impulse));
         }
     });
-    contacts.for_each(|contact| part(&mut points, contact, &[]));
+    points.extend(solved.into_values());
     points
 }
 

@@ -1,6 +1,6 @@
-//! Pictures as SVG, and helpers for writing plots as SVG text.
+//! Drawing as SVG text.
 
-use super::{Anchor, Color, Item, Picture};
+use super::Color;
 use std::fmt::Write;
 
 /// Text escaped for SVG elements and attributes.
@@ -32,93 +32,91 @@ pub fn points(points: &[[f64; 2]]) -> String {
     points.iter().map(|[x, y]| format!("{},{}", px(*x), px(*y))).collect::<Vec<_>>().join(" ")
 }
 
-fn color(Color(r, g, b, _): Color) -> String {
+/// `#rrggbb`; the opacity is left out.
+pub fn hex(Color(r, g, b, _): Color) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
-fn opacity(name: &str, Color(.., a): Color) -> String {
-    if a == 255 { String::new() } else { format!(" {name}=\"{}\"", px(f64::from(a) / 255.0)) }
+/// A picture in the making, from back to front; lengths in pixels, y downward.
+pub struct Drawing {
+    size: [f64; 2],
+    text: String,
 }
 
-/// Closes the element `tag`, with a title inside if there is one.
-fn close(tag: &str, title: &str) -> String {
-    match title {
-        "" => "/>\n".into(),
-        title => format!("><title>{}</title></{tag}>\n", escaped(title)),
+impl Drawing {
+    /// An empty drawing on white, of this width and height.
+    pub fn new(size: [f64; 2]) -> Self {
+        Drawing { size, text: String::new() }
     }
-}
 
-/// A whole SVG file.
-pub fn svg(picture: &Picture) -> String {
-    let [w, h] = picture.size;
-    let mut text = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\" \
-         font-family=\"system-ui, sans-serif\">\n<style>@media (prefers-color-scheme: dark) {{ \
-         [fill='#ffffff'] {{ fill: #14181d }} text {{ fill: #e4e7eb }} [stroke='#1f2933'] {{ stroke: #e4e7eb }} \
-         }}</style>\n<rect width=\"{w}\" height=\"{h}\" fill=\"{}\"/>\n",
-        color(picture.background)
-    );
-    for item in &picture.items {
-        text += &element(item);
+    /// Adds an element with these attributes; `title`, if any, is shown while the pointer is over it.
+    pub fn element(&mut self, tag: &str, attributes: &str, title: &str) {
+        // Writing to a string cannot fail.
+        let _ = match title {
+            "" => writeln!(self.text, "<{tag} {attributes}/>"),
+            title => writeln!(self.text, "<{tag} {attributes}><title>{}</title></{tag}>", escaped(title)),
+        };
     }
-    text + "</svg>\n"
-}
 
-fn element(item: &Item) -> String {
-    let mut text = String::new();
-    // Writing to a string cannot fail.
-    let _ = match item {
-        Item::Polygon { points: corners, fill, stroke, title } => {
-            let fill = fill.map_or("fill=\"none\"".into(), |c| {
-                format!("fill=\"{}\"{}", color(c), opacity("fill-opacity", c))
-            });
-            let stroke = stroke.map_or(String::new(), |(c, width)| {
-                let opacity = opacity("stroke-opacity", c);
-                format!(
-                    " stroke=\"{}\"{opacity} stroke-width=\"{}\" stroke-linejoin=\"round\"",
-                    color(c),
-                    px(width)
-                )
-            });
-            write!(text, "<polygon points=\"{}\" {fill}{stroke}{}", points(corners), close("polygon", title))
-        }
-        Item::Line { from, to, color: c, width } => writeln!(
-            text,
-            "<path d=\"M{} {}L{} {}\" stroke=\"{}\"{} stroke-width=\"{}\" stroke-linecap=\"round\"/>",
-            px(from[0]),
-            px(from[1]),
-            px(to[0]),
-            px(to[1]),
-            color(*c),
-            opacity("stroke-opacity", *c),
-            px(*width)
-        ),
-        Item::Disc { at: [x, y], radius, color: c, title } => write!(
-            text,
-            "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" fill=\"{}\"{}{}",
-            px(*x),
-            px(*y),
-            px(*radius),
-            color(*c),
-            opacity("fill-opacity", *c),
-            close("circle", title)
-        ),
-        Item::Text { at: [x, y], size, anchor, color: c, text: letters } => writeln!(
-            text,
-            "<text x=\"{}\" y=\"{}\" font-size=\"{}\" text-anchor=\"{}\" fill=\"{}\">{}</text>",
-            px(*x),
-            px(*y),
-            px(*size),
-            match anchor {
-                Anchor::Start => "start",
-                Anchor::Middle => "middle",
-                Anchor::End => "end",
-            },
-            color(*c),
-            escaped(letters)
-        ),
-    };
-    text
+    /// Adds an element that contains others.
+    pub fn group(&mut self, opening: &str, inside: &str) {
+        let tag = opening.split(' ').next().unwrap_or(opening);
+        let _ = writeln!(self.text, "<{opening}>{inside}</{tag}>");
+    }
+
+    /// Adds a stroke with round ends, of dashes as long as the gaps between them if `dash` is positive.
+    pub fn line(&mut self, [from, to]: [[f64; 2]; 2], color: Color, width: f64, dash: f64) {
+        let dashes = if dash > 0.0 { format!(" stroke-dasharray=\"{}\"", px(dash)) } else { String::new() };
+        let [from, to] = [from, to].map(|[x, y]| format!("{} {}", px(x), px(y)));
+        let ink = format!("stroke=\"{}\" stroke-width=\"{}\"", hex(color), px(width));
+        self.element("path", &format!("d=\"M{from}L{to}\" {ink} stroke-linecap=\"round\"{dashes}"), "");
+    }
+
+    /// Adds a filled polygon, with a border of this color and width if any.
+    pub fn polygon(&mut self, corners: &[[f64; 2]], fill: Color, border: Option<(Color, f64)>, title: &str) {
+        let border = border.map_or(String::new(), |(color, width)| {
+            let (color, width) = (hex(color), px(width));
+            format!(" stroke=\"{color}\" stroke-width=\"{width}\" stroke-linejoin=\"round\"")
+        });
+        self.element(
+            "polygon",
+            &format!("points=\"{}\" fill=\"{}\"{border}", points(corners), hex(fill)),
+            title,
+        );
+    }
+
+    /// Adds a filled disc with a border of this color and width.
+    pub fn disc(&mut self, [x, y]: [f64; 2], radius: f64, fill: Color, border: (Color, f64), title: &str) {
+        let (place, ink) = (format!("cx=\"{}\" cy=\"{}\" r=\"{}\"", px(x), px(y), px(radius)), hex(border.0));
+        let style = format!("fill=\"{}\" stroke=\"{ink}\" stroke-width=\"{}\"", hex(fill), px(border.1));
+        self.element("circle", &format!("{place} {style}"), title);
+    }
+
+    /// Adds a filled rectangle.
+    pub fn rectangle(&mut self, [x, y]: [f64; 2], [width, height]: [f64; 2], fill: &str) {
+        let [x, y, width, height] = [x, y, width, height].map(px);
+        let place = format!("x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"");
+        self.element("rect", &format!("{place} fill=\"{fill}\""), "");
+    }
+
+    /// Adds a line of text with its baseline at `at`; `anchor` is `start`, `middle` or `end`, as in SVG.
+    pub fn text(&mut self, at: [f64; 2], size: f64, anchor: &str, color: Color, text: &str) {
+        let ([x, y], size) = (at.map(px), px(size));
+        let place = format!("x=\"{x}\" y=\"{y}\" font-size=\"{size}\" text-anchor=\"{anchor}\"");
+        let _ = writeln!(self.text, "<text {place} fill=\"{}\">{}</text>", hex(color), escaped(text));
+    }
+
+    /// The file. In a dark viewer the white background is dark, and text and black strokes are light.
+    pub fn finish(self) -> String {
+        let [w, h] = self.size.map(px);
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\" \
+             font-family=\"system-ui, sans-serif\">\n<style>@media (prefers-color-scheme: dark) {{ \
+             [fill='#ffffff'] {{ fill: #14181d }} text {{ fill: #e4e7eb }} [stroke='#1f2933'] {{ stroke: \
+             #e4e7eb }} }}</style>\n<rect width=\"{w}\" height=\"{h}\" fill=\"#ffffff\"/>\n{}</svg>\n",
+            self.text
+        )
+    }
 }
 
 #[cfg(test)]
@@ -128,9 +126,9 @@ mod tests {
     #[test]
     fn names_cannot_break_out_of_their_place() {
         assert_eq!(escaped("<b a=\"1\">&\u{7}"), "&lt;b a=&quot;1&quot;&gt;&amp;\u{fffd}");
-        let mut picture = Picture::new([10, 10], Color::rgb(0xffffff));
-        picture.text([1.0, 2.0], 9.0, Anchor::Middle, Color::rgb(0x102030), "a<b");
-        let text = svg(&picture);
+        let mut drawing = Drawing::new([10.0, 10.0]);
+        drawing.text([1.0, 2.0], 9.0, "middle", Color::rgb(0x102030), "a<b");
+        let text = drawing.finish();
         assert!(text.contains(">a&lt;b</text>") && text.contains("fill=\"#102030\""), "{text}");
         assert!(text.trim_end().ends_with("</svg>"));
     }

@@ -1,60 +1,20 @@
-//! Recordings: whole runs in a compact file, and the page that plays them.
+//! Recordings: whole runs as JSON, and the page that plays them.
 //!
-//! # The file, version 1
-//!
-//! Little-endian. Sixteen bytes, then a zlib stream with a checksum of its own:
-//!
-//! ```text
-//!  0  8 bytes   "SIMPREC" 0x1a
-//!  8  u32       version
-//! 12  u32       bytes of the payload, uncompressed
-//! 16  zlib      payload
-//! ```
-//!
-//! The payload is a u32 with the length of the header, the [`Header`] as JSON, and the frames. A signed
-//! number is zigzag-coded (0, −1, 1, −2, …). Any number is written in groups of seven bits, the lowest first,
-//! with the high bit set if another group follows. A frame is
-//!
-//! ```text
-//! x of every body, then y       signed, in quanta, less that of the frame before
-//! angle of every body           signed, in 2⁻²⁰ turns, less that of the frame before, within half a turn
-//! with contacts: their number, and for each
-//!     body a, body b            unsigned
-//!     x, y                      signed, in quanta, less those of the point before in this frame
-//!     angle of the normal       unsigned, in 2⁻¹⁶ turns
-//!     separation                signed, in quanta
-//!     impulses                  two u16: the upper halves of the f32 of the normal and the tangential one
-//! curves                        an f32 for each
-//! ```
-//!
-//! The first frame is the start; it is coded relative to a frame of zeros. A quantum is a power of two, at
-//! most 1/8192 of the smallest half width of a moving shape. Most bodies of most scenes move by less than 64
-//! quanta in a step, so a pose takes three bytes, and a body at rest compresses to almost nothing.
+//! A file is a [`Recording`](read::Recording) as JSON in a zlib stream. On a page it stands in Base64. Frames are
+//! whole numbers of small units, less those of the frame before, so that what rests compresses to almost nothing.
 
-mod binary;
 pub mod page;
 pub mod read;
 pub mod record;
 
 use crate::lab::picture::joints::JointRecord;
+use serde::{Deserialize, Serialize};
 
-/// First bytes of every recording.
-const MAGIC: [u8; 8] = *b"SIMPREC\x1a";
-/// The version that is written, and the only one that can be read.
-const VERSION: u32 = 1;
-/// Bytes before the compressed payload.
-const FIXED: usize = 16;
-/// Maximum size of a payload (bytes), which a browser has to hold in memory.
-const LARGEST: usize = 1 << 30;
-/// Angle units per turn of a body.
-const TURN: i64 = 1 << 20;
-/// Angle units per turn of a normal.
-const NORMAL_TURN: u64 = 1 << 16;
-/// Largest coordinate, in quanta: integers of this size are exact in a browser's `f64`.
-const FARTHEST: i64 = 1 << 50;
+/// Unit of angles in frames (rad).
+pub const ANGLE: f64 = 1e-4;
 
 /// Description of the run.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// Name of the scene.
     pub scene: String,
@@ -68,25 +28,22 @@ pub struct Header {
     pub dt: f64,
     /// Steps per frame.
     pub every: u32,
-    /// Number of frames, including the start.
-    pub frames: u32,
-    /// Unit of lengths in frames (m).
-    pub quantum: f64,
+    /// Units of lengths (m), separations (m) and impulses (N·s) in frames.
+    pub units: [f64; 3],
     /// How each body moves: `s`tatic, `k`inematic or `d`ynamic.
     pub kinds: String,
     /// Shapes, in drawing order.
     pub shapes: Vec<ShapeRecord>,
     /// Joints, drawn over the shapes.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<JointRecord>,
     /// Whether frames have contact points.
     pub contacts: bool,
-    /// Description of the curves.
-    pub curves: Vec<CurveName>,
+    /// Name and unit of each curve; a ratio has no unit.
+    pub curves: Vec<[String; 2]>,
 }
 
 /// A shape: a point, a segment or a polygon, expanded by a radius.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ShapeRecord {
     /// Its body.
     pub body: u32,
@@ -96,11 +53,14 @@ pub struct ShapeRecord {
     pub radius: f32,
 }
 
-/// A quantity of which every frame has a value.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct CurveName {
-    /// Name of the quantity.
-    pub name: String,
-    /// Its unit; empty for a ratio.
-    pub unit: String,
+/// State of all bodies and contacts after a step, in units. Each number is less the one in its place in the frame
+/// before, if that was as long.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RecordedFrame {
+    /// Position relative to the start of the first body, and angle. `[3 × bodies]`
+    pub poses: Vec<i64>,
+    /// Bodies a and b, position, separation, and impulse on b. `[7 × points]`
+    pub points: Vec<i64>,
+    /// Values of the curves themselves.
+    pub values: Vec<f32>,
 }

@@ -10,8 +10,8 @@ pub const MOST: usize = 4;
 
 /// Style sheet of the player.
 pub const STYLE: &str = include_str!("replay.css");
-/// Script of the player.
-pub const SCRIPT: &str = include_str!("replay.js");
+/// Script of the player: what draws a frame, then what plays recordings with it.
+pub const SCRIPT: &str = concat!(include_str!("draw.js"), include_str!("replay.js"));
 
 /// A recording on a page.
 pub struct RecordingPanel {
@@ -77,8 +77,7 @@ mod tests {
             outcome: "fell at step 3".into(),
             dt: 0.1,
             every: 1,
-            frames: 1,
-            quantum: 0.1,
+            units: [0.1; 3],
             kinds: "s".into(),
             shapes: vec![ShapeRecord { body: 0, points: vec![[0.0; 2]], radius: 1.0 }],
             joints: Vec::new(),

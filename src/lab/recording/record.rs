@@ -1,17 +1,25 @@
 //! Recording a run, step by step.
 
-use super::binary::{half, put, put_signed};
-use super::{CurveName, FARTHEST, FIXED, Header, LARGEST, MAGIC, NORMAL_TURN, ShapeRecord, TURN, VERSION};
+use super::read::Recording;
+use super::{ANGLE, Header, RecordedFrame, ShapeRecord};
 use crate::engine::bodies::BodyKind;
+use crate::engine::shapes::Shape;
 use crate::engine::world::World;
 use crate::lab::error::Error;
 use crate::lab::metrics::Observation;
 use crate::lab::metrics::overlaps::Overlaps;
-use crate::lab::picture::frame::{Frame, Stage};
-use std::f64::consts::TAU;
+use crate::lab::picture::frame::{Frame, Stage, TouchPoint};
+use crate::lab::scenes::holds::HoldWatch;
 
-/// Minimum number of quanta in half the width of the thinnest moving shape.
-const FINENESS: f64 = 8192.0;
+/// Minimum number of units in half the width of the thinnest moving shape, and in the weight of the lightest body
+/// over a step.
+const FINENESS: f64 = 1000.0;
+/// Units of length ÷ unit of separations.
+const FINER: f64 = 100.0;
+/// Largest coordinate, in units: integers of this size and their differences are exact in a browser's `f64`.
+const FARTHEST: i64 = 1 << 50;
+/// Maximum count of numbers in a recording: 100 to 300 MB of JSON, which a browser has to hold in memory.
+const LARGEST: usize = 50_000_000;
 
 /// Description of the run for a recording.
 #[derive(Clone, Debug)]
@@ -26,14 +34,15 @@ pub struct Caption {
 
 /// Observes a world from its start and records it.
 pub struct Recorder {
-    header: Header,
+    recording: Recording,
+    /// Poses and points of the last frame.
+    last: [Vec<i64>; 2],
     stage: Stage,
-    frames: Vec<u8>,
-    /// Poses of the last frame, in quanta and angle units.
-    last: Vec<[i64; 3]>,
     overlaps: Overlaps,
     meter: Observation,
     steps: u32,
+    /// Numbers in all frames.
+    count: usize,
 }
 
 impl Recorder {
@@ -42,10 +51,15 @@ impl Recorder {
     pub fn new(world: &World, caption: Caption, every: u32, contacts: bool) -> Self {
         let stage = Stage::of(world);
         let moving = stage.shapes.iter().filter(|(b, _)| stage.kinds[*b as usize] != BodyKind::Static);
-        let widths = moving.map(|(_, s)| f64::from(s.min_half_extent())).filter(|w| w.is_finite());
-        let least = widths.fold(f64::INFINITY, f64::min);
-        let least = if least.is_finite() { least } else { 1.0 };
-        let shape = |(body, shape): &(u32, crate::engine::shapes::Shape)| {
+        let widths =
+            moving.map(|(_, s)| f64::from(s.min_half_extent())).filter(|w| *w > 0.0 && w.is_finite());
+        let length = unit(widths.reduce(f64::min).unwrap_or(1.0));
+        let masses = world.bodies.inv_mass.iter().filter(|m| **m > 0.0).map(|m| 1.0 / f64::from(*m));
+        let [gx, gy] = world.settings.gravity.map(f64::from);
+        // Without gravity, that of 1 m/s² counts.
+        let speed = stage.dt * Some(gx.hypot(gy)).filter(|g| *g > 0.0).unwrap_or(1.0);
+        let impulse = unit(masses.reduce(f64::min).unwrap_or(1.0) * speed);
+        let shape = |(body, shape): &(u32, Shape)| {
             let mut points = Vec::new();
             shape.for_each_vertex(|v| points.push(v.to_array()));
             ShapeRecord { body: *body, points, radius: shape.radius() }
@@ -55,7 +69,6 @@ impl Recorder {
             BodyKind::Kinematic => 'k',
             BodyKind::Dynamic => 'd',
         };
-        let curve = |(name, unit): (&str, &str)| CurveName { name: name.into(), unit: unit.into() };
         let header = Header {
             scene: caption.scene,
             solver: caption.solver,
@@ -63,22 +76,23 @@ impl Recorder {
             outcome: String::new(),
             dt: stage.dt,
             every: every.max(1),
-            frames: 0,
-            quantum: (least / FINENESS).log2().floor().exp2(),
+            units: [length, length / FINER, impulse],
             kinds: stage.kinds.iter().map(letter).collect(),
             shapes: stage.shapes.iter().map(shape).collect(),
             joints: stage.joints.clone(),
             contacts,
-            curves: [("penetration", "m"), ("law residual", ""), ("speed", "m/s")].map(curve).to_vec(),
+            curves: [["penetration", "m"], ["law residual", ""], ["speed", "m/s"]]
+                .map(|c| c.map(String::from))
+                .into(),
         };
         let mut recorder = Recorder {
-            last: vec![[0; 3]; stage.kinds.len()],
-            meter: Observation::new(world),
-            header,
+            recording: Recording { header, frames: Vec::new() },
+            last: Default::default(),
             stage,
-            frames: Vec::new(),
             overlaps: Overlaps::default(),
+            meter: Observation::new(world),
             steps: 0,
+            count: 0,
         };
         recorder.frame(world, [0.0; 3]);
         recorder
@@ -87,8 +101,9 @@ impl Recorder {
     /// Adds the step that the world has just taken. Errors: the recording has become too large.
     pub fn add(&mut self, world: &World) -> Result<(), Error> {
         self.steps += 1;
-        if !self.steps.is_multiple_of(self.header.every) {
-            if (self.steps + 1).is_multiple_of(self.header.every) {
+        let every = self.recording.header.every;
+        if !self.steps.is_multiple_of(every) {
+            if (self.steps + 1).is_multiple_of(every) {
                 self.meter = Observation::new(world);
             }
             return Ok(());
@@ -97,73 +112,81 @@ impl Recorder {
         let errors = self.meter.errors();
         self.meter = Observation::new(world);
         self.frame(world, [errors.penetration_max, errors.law_rms_body, errors.rest_velocity]);
-        if self.frames.len() > LARGEST / 2 {
-            let size = self.frames.len() >> 20;
-            let message = format!("{size} MiB by step {}; record fewer frames with --every", self.steps);
+        if self.count > LARGEST {
+            let message =
+                format!("{LARGEST} numbers by step {}; record fewer frames with --every", self.steps);
             return Err(Error::invalid("record", message));
         }
         Ok(())
     }
 
     fn frame(&mut self, world: &World, curves: [f64; 3]) {
-        let overlaps = self.header.contacts.then_some(&mut self.overlaps);
-        let frame = Frame::of(world, &self.stage, overlaps);
-        let quantum = self.header.quantum;
-        let whole = |x: f64| ((x / quantum).round() as i64).clamp(-FARTHEST, FARTHEST);
-        let turned = |angle: f64| (angle / TAU * TURN as f64).round() as i64;
-        let now: Vec<[i64; 3]> =
-            frame.poses.iter().map(|&[x, y, angle]| [whole(x), whole(y), turned(angle)]).collect();
-        let bytes = &mut self.frames;
-        for k in 0..3 {
-            for (last, now) in self.last.iter().zip(&now) {
-                let change = now[k] - last[k];
-                let half = TURN / 2;
-                put_signed(bytes, if k < 2 { change } else { (change + half).rem_euclid(TURN) - half });
+        let Header { contacts, units: [length, separation, impulse], .. } = self.recording.header;
+        let frame = Frame::of(world, &self.stage, contacts.then_some(&mut self.overlaps));
+        let whole = |unit: f64| move |x: f64| ((x / unit).round() as i64).clamp(-FARTHEST, FARTHEST);
+        let pose = |&[x, y, angle]: &[f64; 3]| [whole(length)(x), whole(length)(y), whole(ANGLE)(angle)];
+        let point = |p: &TouchPoint| {
+            let ([a, b], [x, y]) = (p.bodies.map(i64::from), p.at.map(whole(length)));
+            let [u, v] = p.impulse_vector().map(whole(impulse));
+            [a, b, x, y, whole(separation)(p.separation.into()), u, v]
+        };
+        let poses: Vec<i64> = frame.poses.iter().flat_map(pose).collect();
+        let points: Vec<i64> = frame.points.iter().flat_map(point).collect();
+        self.count += poses.len() + points.len();
+        self.recording.frames.push(RecordedFrame {
+            poses: changes(&poses, &self.last[0]),
+            points: changes(&points, &self.last[1]),
+            values: curves.map(three_digits).to_vec(),
+        });
+        self.last = [poses, points];
+    }
+
+    /// Takes `steps` steps, calls `after` with the number of each, and returns the file and its header. A run
+    /// that diverges is recorded up to there. Errors: the recording has become too large.
+    pub fn run(
+        mut self,
+        world: &mut World,
+        mut watch: HoldWatch,
+        steps: u32,
+        mut after: impl FnMut(u32),
+    ) -> Result<(Vec<u8>, Header), Error> {
+        let mut outcome = None;
+        for step in 1..=steps {
+            if let Err(divergence) = world.step() {
+                outcome = Some(format!("blew up at step {}", divergence.step));
+                break;
             }
+            watch.observe(world);
+            self.add(world)?;
+            after(step);
         }
-        self.last = now;
-        if self.header.contacts {
-            put(bytes, frame.points.len() as u64);
-            let mut last = [0; 2];
-            for point in &frame.points {
-                point.bodies.iter().for_each(|&body| put(bytes, u64::from(body)));
-                let at = point.at.map(whole);
-                put_signed(bytes, at[0] - last[0]);
-                put_signed(bytes, at[1] - last[1]);
-                last = at;
-                let angle = f64::from(point.normal[1]).atan2(f64::from(point.normal[0])) / TAU;
-                put(bytes, (angle * NORMAL_TURN as f64).round().rem_euclid(NORMAL_TURN as f64) as u64);
-                put_signed(bytes, whole(f64::from(point.separation)));
-                point.impulse.iter().for_each(|&impulse| bytes.extend(half(impulse).to_le_bytes()));
-            }
-        }
-        for value in curves {
-            bytes.extend((value as f32).to_le_bytes());
-        }
-        self.header.frames += 1;
+        let of_watch = || watch.broken().map_or("holds".to_string(), |broken| broken.to_string());
+        let outcome = outcome.unwrap_or_else(of_watch);
+        let header = Header { outcome: outcome.clone(), ..self.recording.header.clone() };
+        Ok((self.finish(&outcome)?, header))
     }
 
     /// The file; `outcome` describes how the run ended.
     pub fn finish(mut self, outcome: &str) -> Result<Vec<u8>, Error> {
-        self.header.outcome = outcome.to_string();
-        file(&self.header, &self.frames)
+        self.recording.header.outcome = outcome.to_string();
+        let text =
+            serde_json::to_vec(&self.recording).map_err(|e| Error::invalid("record", e.to_string()))?;
+        Ok(miniz_oxide::deflate::compress_to_vec_zlib(&text, 7))
     }
 }
 
-/// A whole file, from its header and frames.
-pub(super) fn file(header: &Header, frames: &[u8]) -> Result<Vec<u8>, Error> {
-    let header = serde_json::to_vec(header).map_err(|e| Error::invalid("record", e.to_string()))?;
-    let mut payload = (header.len() as u32).to_le_bytes().to_vec();
-    payload.extend(header);
-    payload.extend(frames);
-    if payload.len() > LARGEST {
-        let message = format!("{} MiB; record fewer frames with --every", payload.len() >> 20);
-        return Err(Error::invalid("record", message));
-    }
-    let mut bytes = Vec::with_capacity(FIXED + payload.len() / 4);
-    bytes.extend(MAGIC);
-    bytes.extend(VERSION.to_le_bytes());
-    bytes.extend((payload.len() as u32).to_le_bytes());
-    bytes.extend(miniz_oxide::deflate::compress_to_vec_zlib(&payload, 7));
-    Ok(bytes)
+/// The largest power of ten of which `size` has [`FINENESS`].
+fn unit(size: f64) -> f64 {
+    10f64.powi((size / FINENESS).log10().floor() as i32)
+}
+
+/// Numbers less those in their places in the frame before, which may have been shorter.
+fn changes(now: &[i64], before: &[i64]) -> Vec<i64> {
+    let before = before.iter().copied().chain(std::iter::repeat(0));
+    now.iter().zip(before).map(|(now, before)| now - before).collect()
+}
+
+/// The number rounded to three significant digits; 0 if it is not finite, which JSON cannot express.
+fn three_digits(value: f64) -> f32 {
+    format!("{value:.2e}").parse().ok().filter(|x: &f32| x.is_finite()).unwrap_or(0.0)
 }

@@ -11,10 +11,11 @@ use crate::engine::params::Budget;
 use crate::engine::solvers::Variant;
 use crate::engine::world::Order;
 use crate::lab::error::Error;
+use crate::lab::estimate;
+use crate::lab::files;
 use crate::lab::overrides::{self, Override};
 use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::scenes::{self, Loaded, Scene};
-use crate::lab::{estimate, files};
 use std::sync::Arc;
 
 /// Everything that a study runs.

@@ -99,16 +99,9 @@ fn recording(plan: &StudyPlan, record: &Record) -> Result<Vec<u8>, Error> {
     let mut world: World = scene.build(Settings { record_impulses: true, ..own })?;
     let setting = format!("{}, {}", record.budget_text, lanes(record.lanes));
     let caption = Caption { scene: record.scene.clone(), solver: record.solver.into(), setting };
-    let mut recorder = Recorder::new(&world, caption, scene.steps.div_ceil(FRAMES), true);
-    let mut watch = HoldWatch::new(&world, demands);
-    for _ in 0..scene.steps {
-        if let Err(divergence) = world.step() {
-            return recorder.finish(&format!("blew up at step {}", divergence.step));
-        }
-        watch.observe(&world);
-        recorder.add(&world)?;
-    }
-    recorder.finish(&watch.broken().map_or("holds".to_string(), |broken| broken.to_string()))
+    let recorder = Recorder::new(&world, caption, scene.steps.div_ceil(FRAMES), true);
+    let watch = HoldWatch::new(&world, demands);
+    Ok(recorder.run(&mut world, watch, scene.steps, |_| ())?.0)
 }
 
 #[cfg(test)]
