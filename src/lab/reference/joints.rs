@@ -48,12 +48,12 @@
 //! The residual of an angular row is an angular impulse L. It counts as the impulse P through the centers of
 //! mass that has the same energy, K L²/2 = (1/m_a + 1/m_b) P²/2. All rows are therefore in N·s.
 
-use super::problem::{ContactProblem, DPair, Velocity};
+use super::problem::{ContactProblem, DPair, Target, Velocity};
 pub use super::rows::{
     BlockLaw, LawLine, ProblemBlock, ProblemJoint, ProblemRow, ROWS, RowVector, row_scale,
 };
 use super::rows::{OwnRow, inverted};
-use super::target::Target;
+
 
 /// A block with all data that does not depend on impulses.
 #[derive(Clone, Debug)]
@@ -266,17 +266,6 @@ impl ContactProblem {
         }
     }
 
-    /// Adds Jᵀ λ of all joints (N·s, N·s, N·m·s).
-    pub(super) fn sum_joint_impulses(&self, impulses: &[DPair], sums: &mut [Velocity]) {
-        for (first, joint, block) in self.blocks() {
-            for (body, rows) in sides(joint, block) {
-                for (row, pair) in rows.iter().zip(&impulses[first..][..block.rows.len()]) {
-                    (0..3).for_each(|k| sums[body][k] += row[k] * pair[0]);
-                }
-            }
-        }
-    }
-
     /// K of a block; see the [module](self).
     pub(super) fn block_response(&self, joint: &ProblemJoint, block: &ProblemBlock) -> [RowVector; ROWS] {
         response(self, &sides(joint, block))
@@ -302,11 +291,9 @@ mod tests {
     use super::*;
     use crate::lab::reference::certify::{Method, Uniqueness, reference};
     use crate::lab::reference::gallery::{GRAVITY, hanging_chain, machine, pendulum_rod};
-    use crate::lab::reference::newton::newton;
-    use crate::lab::reference::nncg::nncg;
+    use crate::lab::reference::iterate::{Iteration, Stop, iterate};
     use crate::lab::reference::residual::{joint_residuals, natural_map};
     use crate::lab::reference::stewart_trinkle::stewart_trinkle;
-    use crate::lab::reference::sweeps::{Splitting, Stop, SweepDirection, jacobi, pgs};
 
     const STOP: Stop = Stop { tolerance: 1e-14, iterations: 4000 };
 
@@ -314,12 +301,13 @@ mod tests {
     fn solutions(p: &ContactProblem) -> Vec<(&'static str, Vec<DPair>)> {
         p.validate().unwrap();
         let (cold, law) = (p.no_impulses(), Target::Rigid);
+        let by = |method| iterate(p, law, &cold, method, STOP).impulses;
         let all = vec![
             ("Lemke", stewart_trinkle(p, law).unwrap()),
-            ("Newton", newton(p, law, &cold, Stop { iterations: 60, ..STOP }).impulses),
-            ("NNCG", nncg(p, law, &cold, STOP).impulses),
-            ("PGS", pgs(p, law, &cold, SweepDirection::Symmetric, STOP).impulses),
-            ("split Jacobi", jacobi(p, law, &cold, Splitting::Mass, STOP).impulses),
+            ("NNCG", by(Iteration::Conjugate)),
+            ("Anderson", by(Iteration::Anderson(10))),
+            ("PGS", by(Iteration::Symmetric)),
+            ("split Jacobi", by(Iteration::SplitJacobi)),
         ];
         for (name, impulses) in &all {
             let residual = natural_map(p, law, &p.velocities(impulses), impulses) / p.impulse_unit();
@@ -397,7 +385,7 @@ mod tests {
         p.bodies[0] =
             super::super::ProblemBody { inv_inertia: 0.0, free_velocity: [3.0, 4.0, 0.0], ..p.bodies[0] };
         let solve = |p: &ContactProblem| {
-            pgs(p, Target::Rigid, &p.no_impulses(), SweepDirection::Forward, STOP).impulses
+            iterate(p, Target::Rigid, &p.no_impulses(), Iteration::Forward, STOP).impulses
         };
         p.joints[0].blocks[0].law = BlockLaw::Motor { speed: 0.0, cap: 2.5 };
         p.validate().unwrap();

@@ -19,8 +19,8 @@
 //! **Cost**: O(n²) per pivot with n ≤ 4 rows per contact, and O(n³) for n joint rows. Meant for up to about
 //! 150 contacts.
 
-use super::problem::{ContactProblem, DPair, Velocity};
-use super::residual::{Target, natural_map};
+use super::problem::{ContactProblem, DPair, Target, Velocity};
+use super::residual::natural_map;
 use super::rows::BlockBound;
 use crate::engine::constraints::numerics::coulomb_lcp::CoulombLcp;
 use crate::engine::constraints::numerics::lemke::LemkeOutcome;
@@ -363,16 +363,14 @@ mod tests {
         for mu in [0.0, 0.5] {
             let p = plank(&[-1.5, -0.5, 0.5, 1.5], mu);
             let l = solve(&p);
-            let [px, py, moment] = p.body_impulses(&l)[0];
-            assert!(px.abs() < 1e-16 && moment.abs() < 1e-16, "{px:e} {moment:e}");
-            close(py, GRAVITY * p.h);
+            close(l.iter().map(|l| l[0]).sum(), GRAVITY * p.h);
             assert!(p.mass_norm(&p.velocities(&l)) < 1e-15);
         }
     }
 
     #[test]
     fn compliant_contact_yields_in_proportion() {
-        use crate::lab::reference::residual::OwnRow;
+        use crate::lab::reference::rows::OwnRow;
         // u + b + c λ = 0 with u = −g h + λ: λ = (g h − b)/(1 + c).
         let p = disc_column(1);
         let rows = [OwnRow { bias: -0.01, compliance: 0.5 }];
