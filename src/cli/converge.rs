@@ -126,7 +126,10 @@ pub fn run(args: &ConvergeArgs) -> Result<ExitCode, Error> {
     let is_frozen = args.problem.ends_with(".frozen") || path.is_file() && !args.problem.ends_with(".json");
     if let Some(file) = &args.freeze {
         if is_frozen {
-            return Err(Error::invalid("--freeze", format!("'{}' is a frozen problem already", args.problem)));
+            return Err(Error::invalid(
+                "--freeze",
+                format!("'{}' is a frozen problem already", args.problem),
+            ));
         }
         return freeze(args, file);
     }

@@ -276,10 +276,12 @@ pub fn converge_watched(
     if options.rounds > 0 {
         tell(parts - 2, parts, "times");
         // Every round times every solver once, so a slow spell of the machine affects all alike.
-        let ranges: Vec<TimedRange> = timers.iter_mut().map(|(s, replay, _)| TimedRange::of(s, replay)).collect();
+        let ranges: Vec<TimedRange> =
+            timers.iter_mut().map(|(s, replay, _)| TimedRange::of(s, replay)).collect();
         let mut samples = vec![Vec::new(); timers.len()];
         for _ in 0..options.rounds {
-            for (((schedule, replay, _), range), samples) in timers.iter_mut().zip(&ranges).zip(&mut samples) {
+            for (((schedule, replay, _), range), samples) in timers.iter_mut().zip(&ranges).zip(&mut samples)
+            {
                 samples.push(range.time(schedule, replay));
             }
         }

@@ -92,7 +92,8 @@ fn line(area: &Area, points: Vec<(i32, i32)>, order: Sequence, style: ShapeStyle
 fn panel(area: &Area, top: i32, report: &ConvergeReport, colors: Colors, start: Start, law: usize) -> Drawn {
     let edges = Edges { left: 64, right: PANEL.0 - 28, top, bottom: top + PANEL.1 - HEADING - 44 };
     // If a solver's result does not depend on the start, its cold curve stands for both.
-    let remembers = |c: &ReplayCurve| report.curves.iter().any(|o| o.solver == c.solver && o.start == Start::Warm);
+    let remembers =
+        |c: &ReplayCurve| report.curves.iter().any(|o| o.solver == c.solver && o.start == Start::Warm);
     let curves = || report.curves.iter().filter(|c| c.start == start || !remembers(c));
     let sweeps = curves().flat_map(|c| c.points.iter().filter(|p| p.sweeps > 0).map(|p| p.sweeps as f64));
     let (across, up) = (LogScale::of(sweeps, 6), LogScale::of(RESIDUALS.into_iter(), 10));

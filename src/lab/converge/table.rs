@@ -53,14 +53,16 @@ fn answer(report: &ConvergeReport) -> String {
     let mut text =
         format!("In colored order ({} lanes{emulated}), against the rigid contact law:\n", report.lanes);
     for (at, start) in TOLD.into_iter().flat_map(|at| [(at, Start::Cold), (at, Start::Warm)]) {
-        let own: Vec<_> = whole.iter().filter(|c| c.start == start).map(|c| (&c.solver, to(c, &c.rigid, at))).collect();
+        let own: Vec<_> =
+            whole.iter().filter(|c| c.start == start).map(|c| (&c.solver, to(c, &c.rigid, at))).collect();
         if own.is_empty() {
             continue;
         }
         let mut reached: Vec<_> = own.iter().filter_map(|(name, n)| n.map(|n| (n, name))).collect();
         reached.sort();
         let each: Vec<String> = reached.iter().map(|(n, name)| format!("{name} {n}")).collect();
-        let never: Vec<&str> = own.iter().filter(|(_, n)| n.is_none()).map(|(name, _)| name.as_str()).collect();
+        let never: Vec<&str> =
+            own.iter().filter(|(_, n)| n.is_none()).map(|(name, _)| name.as_str()).collect();
         text += &format!("Sweeps to {:.0e}, {start}: ", TOLERANCES[at]);
         text += &match (each.is_empty(), never.is_empty()) {
             (true, _) => "no solver reaches it".into(),
@@ -103,7 +105,8 @@ fn baseline(report: &ConvergeReport, curves: &[&ReplayCurve]) -> String {
         text += &format!(", {:.0} sweeps to 1e-2 and {:.0} to 1e-4", sweeps(1e-2), sweeps(1e-4));
     }
     let is_rigid = |c: &&&ReplayCurve| c.start == Start::Cold && c.own_is_rigid;
-    let measured = curves.iter().filter(is_rigid).filter_map(|c| Some(format!("{} {:.4}", c.solver, c.rigid.rate?)));
+    let measured =
+        curves.iter().filter(is_rigid).filter_map(|c| Some(format!("{} {:.4}", c.solver, c.rigid.rate?)));
     match measured.collect::<Vec<_>>().as_slice() {
         [] => text + ".\n",
         list => format!("{text}; measured per iteration: {}.\n", list.join(", ")),

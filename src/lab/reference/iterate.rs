@@ -29,7 +29,7 @@ pub enum Status {
     Diverged,
 }
 
-/// A method; one iteration is a sweep, or two of [`Iteration::Symmetric`].
+/// A method; one iteration is a sweep, or two if they are symmetric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Iteration {
     /// Gauss–Seidel in the order of the problem, normal and friction row of each point in turn.
@@ -42,7 +42,7 @@ pub enum Iteration {
     SplitJacobi,
     /// Gauss–Seidel with nonsmooth conjugate gradients.
     Conjugate,
-    /// Gauss–Seidel with Anderson mixing of this many sweeps.
+    /// Symmetric Gauss–Seidel with Anderson mixing of this many differences.
     Anderson(usize),
 }
 
@@ -97,7 +97,7 @@ pub fn iterate(
             Iteration::SplitJacobi => oracle.jacobi(&sweep, true, true),
             _ => oracle.sweep(&sweep),
         }
-        if method == Iteration::Symmetric {
+        if matches!(method, Iteration::Symmetric | Iteration::Anderson(_)) {
             oracle.sweep(&back);
         }
         if let Some(mixing) = &mut mixing {
@@ -155,40 +155,63 @@ pub struct Anderson {
     depth: usize,
     /// Whether growth of |f| by two forgets all sweeps before.
     pub restarts: bool,
-    /// f and g of the sweeps since the last restart.
-    seen: Vec<[Vec<DPair>; 2]>,
+    /// Fraction of |Δf|² of each difference that is added to its diagonal of the least-squares problem (1).
+    pub damping: f64,
+    /// Whether instead that fraction of ∑ |Δf|² is added to all.
+    pub damps_sum: bool,
+    /// f and g of the last sweep.
+    last: Option<[Vec<DPair>; 2]>,
+    /// Δf and Δg since the last restart, and the products of each Δf with those up to it.
+    differences: Vec<[Vec<DPair>; 2]>,
+    products: Vec<Vec<f64>>,
 }
 
 impl Anderson {
     /// Mixing of `depth` differences.
     pub fn new(depth: usize) -> Self {
-        Anderson { depth, restarts: true, seen: Vec::new() }
+        let (last, differences, products) = (None, Vec::new(), Vec::new());
+        Anderson { depth, restarts: true, damping: 1e-14, damps_sum: false, last, differences, products }
     }
 }
 
 impl Acceleration for Anderson {
     fn next(&mut self, before: &[DPair], swept: &[DPair]) -> Vec<DPair> {
         let (f, g) = (plus(swept, -1.0, before), swept.to_vec());
-        if self.restarts && self.seen.last().is_some_and(|[last, _]| dot(&f, &f) > 4.0 * dot(last, last)) {
-            self.seen.clear();
+        if let Some([last_f, last_g]) = self.last.take() {
+            if self.restarts && dot(&f, &f) > 4.0 * dot(&last_f, &last_f) {
+                self.differences.clear();
+                self.products.clear();
+            } else {
+                if self.differences.len() == self.depth {
+                    self.differences.remove(0);
+                    self.products.remove(0);
+                    for row in &mut self.products {
+                        row.remove(0);
+                    }
+                }
+                self.differences.push([plus(&f, -1.0, &last_f), plus(&g, -1.0, &last_g)]);
+                let newest = &self.differences[self.differences.len() - 1][0];
+                self.products.push(self.differences.iter().map(|[df, _]| dot(df, newest)).collect());
+            }
         }
-        self.seen.push([f, g]);
-        if self.seen.len() > self.depth + 1 {
-            self.seen.remove(0);
-        }
-        let difference = |of: usize| -> Vec<Vec<DPair>> {
-            self.seen.windows(2).rev().map(|pair| plus(&pair[1][of], -1.0, &pair[0][of])).collect()
+        let n = self.differences.len();
+        let square = |i: usize| self.products[i][i];
+        // Scaled to a unit diagonal.
+        let size: Vec<f64> = (0..n).map(|i| if self.damps_sum { 1.0 } else { square(i).sqrt() }).collect();
+        let sum: f64 = (0..n).map(square).sum();
+        let damping = if self.damps_sum { self.damping * sum } else { self.damping };
+        let entry = |i: usize, j: usize| {
+            self.products[i.max(j)][i.min(j)] / (size[i] * size[j]) + if i == j { damping } else { 0.0 }
         };
-        let ([df, dg], [f, g]) = ([difference(0), difference(1)], &self.seen[self.seen.len() - 1]);
-        let trace: f64 = df.iter().map(|a| dot(a, a)).sum();
-        let entry = |i: usize, j: usize| dot(&df[i], &df[j]) + if i == j { 1e-9 * trace } else { 0.0 };
-        let n = df.len();
-        let mut gram: Vec<f64> = (0..n * n).map(|at| entry(at / n, at % n)).collect();
-        let mut gamma: Vec<f64> = df.iter().map(|a| dot(a, f)).collect();
-        if trace == 0.0 || !solve_in_place(&mut gram, &mut gamma, 0.0) {
-            return g.clone();
+        let mut matrix: Vec<f64> = (0..n * n).map(|at| entry(at / n, at % n)).collect();
+        let mut gamma: Vec<f64> = (0..n).map(|i| dot(&self.differences[i][0], &f) / size[i]).collect();
+        let is_solved = (0..n).all(|i| square(i) > 0.0) && solve_in_place(&mut matrix, &mut gamma, 0.0);
+        let mut next = g.clone();
+        for i in (0..n).filter(|_| is_solved) {
+            next = plus(&next, -gamma[i] / size[i], &self.differences[i][1]);
         }
-        gamma.iter().zip(&dg).fold(g.clone(), |next, (gamma, dg)| plus(&next, -gamma, dg))
+        self.last = Some([f, g]);
+        next
     }
 }
 
@@ -313,9 +336,10 @@ mod tests {
 
     #[test]
     fn accelerations_beat_sweeps_threefold_on_columns() {
-        for (n, method) in [10, 20, 40].into_iter().flat_map(|n| {
-            [Iteration::Conjugate, Iteration::Anderson(10)].map(|method| (n, method))
-        }) {
+        for (n, method) in [10, 20, 40]
+            .into_iter()
+            .flat_map(|n| [Iteration::Conjugate, Iteration::Anderson(10)].map(|method| (n, method)))
+        {
             let p = disc_column(n);
             let [fast, slow] = [method, Iteration::Symmetric].map(|method| run(&p, method, 1e-12));
             assert_eq!(fast.status, Status::Converged);

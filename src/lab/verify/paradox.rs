@@ -57,7 +57,8 @@ fn cards_in_statics(_: &Lab) -> Result<Finding, Failure> {
         for _ in 0..30 {
             let middle = 0.5 * (low + high);
             let problem = a_frame(middle, extra);
-            let speed = problem.mass_norm(&reference(&problem).map_err(|e| Failure::Unmeasured(e.to_string()))?.velocities);
+            let speed = problem
+                .mass_norm(&reference(&problem).map_err(|e| Failure::Unmeasured(e.to_string()))?.velocities);
             *(if speed < 1e-9 { &mut high } else { &mut low }) = middle;
         }
         worst = largest([worst, (high / truth - 1.0).abs()]);
