@@ -28,7 +28,9 @@ use std::process::ExitCode;
 ///
 /// The problem is that of one step of a scene: masses, velocities, Jacobians, gaps, friction and warm-start
 /// impulses; and the rows of joints with their errors, springs, motors and bounds. Values stored in f32 are taken
-/// exactly. --freeze writes it to a file, with a reference solution if one can be found and certified.
+/// exactly. --freeze writes it to a file, with a reference solution if one can be found and certified. With --freeze,
+/// --solver, its budget, --set, --impacts and --without say how the steps before are solved; without it, --set
+/// applies to the compared solvers.
 ///
 /// Prints the sweeps per solver to 1e-2 and 1e-4, next to the f64 Gauss–Seidel rate; then iterations to
 /// residuals 1e-1 to 1e-6, the asymptotic rate, the distance of the velocities from the certified reference, and
@@ -62,7 +64,7 @@ pub struct ConvergeArgs {
     /// Write the frozen problem of a scene to this file and run no solver on it
     #[arg(long, value_name = "FILE", conflicts_with_all = ["solvers", "max_iterations", "lanes", "seed", "repeats", "out"])]
     pub freeze: Option<PathBuf>,
-    /// With --freeze: how the steps before are solved. Without, --set applies to the compared solvers.
+    /// How the steps before are solved
     #[command(flatten)]
     pub setting: SettingArgs,
     /// Solvers

@@ -1,8 +1,8 @@
 //! Reference solutions, which are accepted only with evidence.
 //!
 //! A solution becomes a reference if its natural-map residual is at most [`CERTIFIED`], measured by
-//! [`super::residual`], which shares no code with the methods. It is also accepted if two methods of
-//! different families agree on the velocities to [`AGREED`] in the mass norm. The evidence is stored with the
+//! [`super::residual`], which shares no code with the methods. It is also accepted if two methods agree
+//! on the velocities to [`AGREED`] in the mass norm. The evidence is stored with the
 //! solution.
 //!
 //! Impulses of a hyperstatic pile form an affine family. Velocities v⁺ and net body impulses Jᵀλ are unique
@@ -27,13 +27,13 @@ pub const AGREED: f64 = 1e-8;
 pub const LEMKE_CONTACTS: usize = 150;
 
 /// Maximum number of row updates of an iterative method, if it makes more than a thousand iterations.
-const MOST_UPDATES: usize = 10_000_000;
+const MOST_UPDATES: usize = 20_000_000;
 /// Differences that Anderson mixing combines.
 const MIXED: usize = 60;
 /// Maximum number of joint rows to eliminate before Lemke's method. The work grows with their cube.
 pub const LEMKE_ROWS: usize = 450;
 
-/// A family of methods.
+/// A method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
@@ -67,11 +67,11 @@ impl fmt::Display for Method {
 pub enum Uniqueness {
     /// Without friction, the velocities solve a strictly convex problem.
     Proven,
-    /// Two families of methods found the same velocities.
+    /// Two methods found the same velocities.
     Agreed,
-    /// Two families found different velocities, each certified: only a residual can decide.
+    /// Two methods found different velocities, each certified: only a residual can decide.
     Multiple,
-    /// Only one family found a solution.
+    /// Only one method found a solution.
     Unknown,
 }
 
@@ -95,7 +95,7 @@ pub struct Certificate {
     pub method: Method,
     /// Natural-map residual, see [`certify`] (1).
     pub natural_map: f64,
-    /// The solution of another family, if one ended with finite impulses.
+    /// The solution of another method, if one ended with finite impulses.
     pub witness: Option<Witness>,
     /// Whether the velocities are unique.
     pub uniqueness: Uniqueness,
@@ -202,15 +202,17 @@ fn attempt(problem: &ContactProblem, method: Method) -> Option<Attempt> {
     let cold = problem.no_impulses();
     // Two decades below the certificate. The scale of the certificate is at least as large as that of the
     // history.
-    let iterations = (MOST_UPDATES / problem.unknowns().max(1)).clamp(1_000, 5_000);
-    let stop = Stop { tolerance: 0.01 * CERTIFIED, iterations };
-    let iterated = |method| iterate(problem, Target::Rigid, &cold, method, stop).impulses;
+    let iterated = |method, most| {
+        let iterations = (MOST_UPDATES / problem.unknowns().max(1)).clamp(1_000, most);
+        let stop = Stop { tolerance: 0.01 * CERTIFIED, iterations };
+        iterate(problem, Target::Rigid, &cold, method, stop).impulses
+    };
     let impulses = match method {
         Method::StewartTrinkle => stewart_trinkle(problem, Target::Rigid).ok()?,
         Method::Newton => return None,
-        Method::Nncg => iterated(Iteration::Conjugate),
-        Method::Anderson => iterated(Iteration::Anderson(MIXED)),
-        Method::Pgs => iterated(Iteration::Symmetric),
+        Method::Nncg => iterated(Iteration::Conjugate, 5_000),
+        Method::Anderson => iterated(Iteration::Anderson(MIXED), 10_000),
+        Method::Pgs => iterated(Iteration::Symmetric, 5_000),
     };
     let natural_map = certify(problem, &impulses);
     let velocities = problem.velocities(&impulses);

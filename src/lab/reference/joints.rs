@@ -321,7 +321,7 @@ mod tests {
             close("y", l[1][0], -4.0 * factor);
             let r = reference(&p).unwrap();
             close("reference", r.impulses[0][0], -3.0 * factor);
-            // The law is not a box, so uniqueness is agreed by two families instead of proven. Lemke's method
+            // The law is not a box, so uniqueness is agreed by two methods instead of proven. Lemke's method
             // has no answer if the cap binds.
             assert_eq!(r.certificate.uniqueness, Uniqueness::Agreed);
             assert_eq!(r.certificate.method == Method::StewartTrinkle, factor == 0.5);
