@@ -1,9 +1,9 @@
 //! Iterations of the oracle's sweeps: projected Gauss–Seidel, Jacobi, and two accelerations of Gauss–Seidel.
 //!
-//! **Sources**: Gauss–Seidel: Jean & Moreau 1992 (`jean1992`), Catto 2005. [`Conjugate`]: Silcowitz-Hansen,
+//! **Sources**: Gauss–Seidel: Jean & Moreau 1992, Catto 2005. [`ConjugateSweeps`]: Silcowitz-Hansen,
 //! Niebe & Erleben 2010, algorithm 1. [`Anderson`]: Walker & Ni 2011.
 
-use super::oracle::{Oracle, RowOrder, Sweep};
+use super::oracle::{Oracle, RowOrder, ScalarSweep};
 use super::problem::{ContactProblem, DPair, Target, Velocity};
 use super::residual::LawMeasure;
 use super::rows::OwnRow;
@@ -69,10 +69,10 @@ pub fn iterate(
 ) -> IterativeRun {
     let (unit, measure) = (problem.impulse_unit(), LawMeasure::new(problem, target));
     let law: Vec<OwnRow> = (0..problem.contacts.len()).map(|i| target.row(problem, i)).collect();
-    let sweep = Sweep { rows: RowOrder::PointByPoint, ..Sweep::new(&law[..]) };
-    let back = Sweep { reversed: true, ..sweep };
+    let sweep = ScalarSweep { rows: RowOrder::PointByPoint, ..ScalarSweep::new(&law[..]) };
+    let back = ScalarSweep { reversed: true, ..sweep };
     let mut mixing: Option<Box<dyn Acceleration>> = match method {
-        Iteration::Conjugate => Some(Box::new(Conjugate::default())),
+        Iteration::Conjugate => Some(Box::new(ConjugateSweeps::default())),
         Iteration::Anderson(depth) => Some(Box::new(Anderson::new(depth))),
         _ => None,
     };
@@ -126,12 +126,12 @@ pub fn plus(a: &[DPair], s: f64, b: &[DPair]) -> Vec<DPair> {
 /// Nonsmooth nonlinear conjugate gradients: the change of a sweep, r, takes the place of the gradient of
 /// Fletcher and Reeves' method, λ ← λ + r + β p with β = |r|²/|r before|².
 #[derive(Clone, Debug, Default)]
-pub struct Conjugate {
+pub struct ConjugateSweeps {
     direction: Vec<DPair>,
     previous: f64,
 }
 
-impl Acceleration for Conjugate {
+impl Acceleration for ConjugateSweeps {
     fn next(&mut self, before: &[DPair], swept: &[DPair]) -> Vec<DPair> {
         let descent = plus(swept, -1.0, before);
         let square = dot(&descent, &descent);

@@ -28,7 +28,7 @@ use super::rows::{OwnRow, positive};
 use std::ops::Range;
 
 /// Rows of a contact point on its bodies, with the sign of the side; `None` for a static one.
-pub type PointRows = [Option<(usize, SideRows)>; 2];
+pub type SidesOfPoint = [Option<(usize, SideRows)>; 2];
 
 /// State of a run: bodies and impulses.
 #[derive(Clone, Debug)]
@@ -69,13 +69,13 @@ impl Line {
 }
 
 /// How normal rows treat gaps.
-pub trait Rule: Copy {
+pub trait GapRule: Copy {
     /// The line of point `i`.
     fn line(self, oracle: &Oracle, i: usize) -> Line;
 }
 
 /// The law of every contact: its bias and compliance at the start of the step.
-impl Rule for &[OwnRow] {
+impl GapRule for &[OwnRow] {
     fn line(self, oracle: &Oracle, i: usize) -> Line {
         let OwnRow { bias, compliance } = self[i];
         if compliance == 0.0 {
@@ -107,7 +107,7 @@ pub enum RowOrder {
 
 /// Parameters of a velocity sweep.
 #[derive(Clone, Copy, Debug)]
-pub struct Sweep<R> {
+pub struct ScalarSweep<R> {
     /// Rule of normal rows.
     pub rule: R,
     /// Order of the rows.
@@ -122,11 +122,11 @@ pub struct Sweep<R> {
     pub reversed: bool,
 }
 
-impl<R> Sweep<R> {
+impl<R> ScalarSweep<R> {
     /// A sweep with normal rows first, on fixed arms.
     pub fn new(rule: R) -> Self {
         let rows = RowOrder::NormalsFirst;
-        Sweep { rule, rows, relax: 1.0, friction: true, turned: false, reversed: false }
+        ScalarSweep { rule, rows, relax: 1.0, friction: true, turned: false, reversed: false }
     }
 }
 
@@ -177,7 +177,7 @@ impl<'a> Oracle<'a> {
     }
 
     /// Rows of point `i`.
-    pub fn rows(&self, i: usize, turned: bool) -> PointRows {
+    pub fn rows(&self, i: usize, turned: bool) -> SidesOfPoint {
         let rows = self.problem.contacts[i].both_sides();
         if !turned {
             return rows;
@@ -192,13 +192,13 @@ impl<'a> Oracle<'a> {
     }
 
     /// J v
-    pub fn speed(&self, rows: &PointRows, axis: usize) -> f64 {
+    pub fn speed(&self, rows: &SidesOfPoint, axis: usize) -> f64 {
         let side = |(b, j): &(usize, SideRows)| (0..3).map(|k| j[axis][k] * self.v[*b][k]).sum::<f64>();
         rows.iter().flatten().map(side).sum()
     }
 
     /// k = J₁ M⁻¹ J₂ᵀ of two rows of one manifold (1/kg).
-    pub fn coupling(&self, one: (&PointRows, usize), other: (&PointRows, usize)) -> f64 {
+    pub fn coupling(&self, one: (&SidesOfPoint, usize), other: (&SidesOfPoint, usize)) -> f64 {
         let product = |((b, p), (_, q)): (&(usize, SideRows), &(usize, SideRows))| {
             (0..3).map(|k| self.inverse[*b][k] * p[one.1][k] * q[other.1][k]).sum::<f64>()
         };
@@ -206,19 +206,19 @@ impl<'a> Oracle<'a> {
     }
 
     /// Effective mass of a row (kg).
-    pub fn mass(&self, rows: &PointRows, axis: usize) -> f64 {
+    pub fn mass(&self, rows: &SidesOfPoint, axis: usize) -> f64 {
         1.0 / self.coupling((rows, axis), (rows, axis))
     }
 
     /// v ← v + M⁻¹ Jᵀ λ
-    pub fn push(&mut self, rows: &PointRows, axis: usize, impulse: f64) {
+    pub fn push(&mut self, rows: &SidesOfPoint, axis: usize, impulse: f64) {
         for (b, j) in rows.iter().flatten() {
             (0..3).for_each(|k| self.v[*b][k] += self.inverse[*b][k] * j[axis][k] * impulse);
         }
     }
 
     /// x ← x + M⁻¹ Jᵀ p
-    pub fn displace(&mut self, rows: &PointRows, axis: usize, by: f64) {
+    pub fn displace(&mut self, rows: &SidesOfPoint, axis: usize, by: f64) {
         for (b, j) in rows.iter().flatten() {
             (0..3).for_each(|k| self.x[*b][k] += self.inverse[*b][k] * j[axis][k] * by);
         }
@@ -236,7 +236,7 @@ impl<'a> Oracle<'a> {
     }
 
     /// Sets the impulse of a row of point `i` and updates velocities.
-    pub fn set(&mut self, i: usize, axis: usize, rows: &PointRows, new: f64) {
+    pub fn set(&mut self, i: usize, axis: usize, rows: &SidesOfPoint, new: f64) {
         let old = std::mem::replace(&mut self.l[i][axis], new);
         self.push(rows, axis, new - old);
     }
@@ -252,7 +252,7 @@ impl<'a> Oracle<'a> {
     }
 
     /// c and s of a normal row: the impulse that satisfies the row alone is max(0, c − s un).
-    fn normal_line<R: Rule>(&self, i: usize, sweep: &Sweep<R>) -> DPair {
+    fn normal_line<R: GapRule>(&self, i: usize, sweep: &ScalarSweep<R>) -> DPair {
         let Line { push, scale, keep } = sweep.rule.line(self, i);
         let (m, old) = (self.mass(&self.rows(i, false), 0), self.l[i][0]);
         let c = keep * old - m * push;
@@ -260,7 +260,7 @@ impl<'a> Oracle<'a> {
     }
 
     /// Solves the normal row of point `i`.
-    pub fn normal_row<R: Rule>(&mut self, i: usize, sweep: &Sweep<R>) {
+    pub fn normal_row<R: GapRule>(&mut self, i: usize, sweep: &ScalarSweep<R>) {
         let rows = self.rows(i, sweep.turned);
         let [c, s] = self.normal_line(i, sweep);
         // NaN stays NaN, so that divergence is detected.
@@ -269,7 +269,7 @@ impl<'a> Oracle<'a> {
     }
 
     /// Solves the friction row of point `i`.
-    pub fn friction_row<R>(&mut self, i: usize, sweep: &Sweep<R>) {
+    pub fn friction_row<R>(&mut self, i: usize, sweep: &ScalarSweep<R>) {
         let bound = self.problem.contacts[i].friction * self.l[i][0];
         if bound == 0.0 && self.l[i][1] == 0.0 {
             return;
@@ -280,7 +280,7 @@ impl<'a> Oracle<'a> {
     }
 
     /// Solves the rows of one manifold.
-    pub fn contact<R: Rule>(&mut self, m: Range<usize>, sweep: &Sweep<R>) {
+    pub fn contact<R: GapRule>(&mut self, m: Range<usize>, sweep: &ScalarSweep<R>) {
         let mut both = [m.start, m.end - 1];
         let points = &mut both[..m.len()];
         if sweep.reversed {
@@ -311,7 +311,7 @@ impl<'a> Oracle<'a> {
 
     /// Solves both normal rows together: takes the one of four cases in which no impulse is negative and no
     /// point approaches.
-    fn block<R: Rule>(&mut self, points: &[usize], sweep: &Sweep<R>, singular: f64) {
+    fn block<R: GapRule>(&mut self, points: &[usize], sweep: &ScalarSweep<R>, singular: f64) {
         let &[i, j] = points else { return self.normal_row(points[0], sweep) };
         let rows = [i, j].map(|i| self.rows(i, sweep.turned));
         let [[c1, s1], [c2, s2]] = [i, j].map(|i| self.normal_line(i, sweep));
@@ -336,7 +336,7 @@ impl<'a> Oracle<'a> {
 
     /// Solves both rows of a point together: takes the case that holds of open, sticking, and slipping in
     /// either direction.
-    fn cone<R: Rule>(&mut self, i: usize, sweep: &Sweep<R>) {
+    fn cone<R: GapRule>(&mut self, i: usize, sweep: &ScalarSweep<R>) {
         let rows = self.rows(i, false);
         let Line { push, .. } = sweep.rule.line(self, i);
         let (l, mu) = (self.l[i], self.problem.contacts[i].friction);
@@ -363,12 +363,12 @@ impl<'a> Oracle<'a> {
     }
 
     /// Gauss–Seidel over manifolds in the given order.
-    pub fn sweep_in<R: Rule>(&mut self, sweep: &Sweep<R>, order: impl Iterator<Item = usize>) {
+    pub fn sweep_in<R: GapRule>(&mut self, sweep: &ScalarSweep<R>, order: impl Iterator<Item = usize>) {
         order.for_each(|m| self.contact(self.manifolds[m].clone(), sweep));
     }
 
     /// Gauss–Seidel over all joints, then all manifolds; reversed, from last to first.
-    pub fn sweep<R: Rule>(&mut self, sweep: &Sweep<R>) {
+    pub fn sweep<R: GapRule>(&mut self, sweep: &ScalarSweep<R>) {
         if sweep.reversed {
             self.sweep_in(sweep, (0..self.manifolds.len()).rev());
             (0..self.lines.len()).rev().for_each(|line| self.joint(line));
@@ -394,7 +394,7 @@ impl<'a> Oracle<'a> {
     /// Whole masses diverge where λ_max(D⁻¹G) > 2. A copy with 1/n of the mass sees n times the inverse mass,
     /// and averaging divides the effect of its impulse by n again: Jacobi with D_i = ∑_sides n J_i M⁻¹ J_iᵀ.
     /// Since (∑ᵢ xᵢ)² ≤ n ∑ xᵢ² on every body, D ≥ G, so it converges (Tonge et al. 2012).
-    pub fn jacobi<R: Rule>(&mut self, sweep: &Sweep<R>, split: bool, by_rows: bool) {
+    pub fn jacobi<R: GapRule>(&mut self, sweep: &ScalarSweep<R>, split: bool, by_rows: bool) {
         let mut copies = vec![0.0; self.v.len()];
         for m in &self.manifolds {
             let rows = |c: &super::ProblemContact| if c.friction > 0.0 { 2.0 } else { 1.0 };

@@ -8,9 +8,9 @@ use crate::lab::error::Error;
 pub const BLOCKS: usize = 6;
 
 /// A part of a problem, for messages.
-struct Part<'a>(&'a str);
+struct ProblemPart<'a>(&'a str);
 
-impl Part<'_> {
+impl ProblemPart<'_> {
     fn require(&self, ok: bool, message: impl FnOnce() -> String) -> Result<(), Error> {
         if ok { Ok(()) } else { Err(Error::invalid(self.0, message())) }
     }
@@ -47,20 +47,20 @@ impl ContactProblem {
     /// contact has a side that responds to impulses, and every joint block has rows that do.
     pub fn validate(&self) -> Result<(), Error> {
         // Names appear in tables.
-        Part("name").require(!self.name.chars().any(char::is_control), || {
+        ProblemPart("name").require(!self.name.chars().any(char::is_control), || {
             format!("must not have control characters, is {:?}", self.name)
         })?;
-        Part("h").finite(&[self.h])?;
-        Part("h").require(self.h > 0.0, || format!("the step is {} s, must be > 0", self.h))?;
+        ProblemPart("h").finite(&[self.h])?;
+        ProblemPart("h").require(self.h > 0.0, || format!("the step is {} s, must be > 0", self.h))?;
         for (i, b) in self.bodies.iter().enumerate() {
             let place = format!("bodies[{i}]");
-            let part = Part(&place);
+            let part = ProblemPart(&place);
             part.finite(&[b.inverse(), b.velocity, b.free_velocity].concat())?;
             part.not_negative(&[("inv_mass", b.inv_mass), ("inv_inertia", b.inv_inertia)])?;
         }
         for (i, c) in self.contacts.iter().enumerate() {
             let place = format!("contacts[{i}]");
-            let part = Part(&place);
+            let part = ProblemPart(&place);
             let pairs = [c.normal, c.arm_a, c.arm_b, [c.gap, c.friction], c.warm_impulse, [c.rebound; 2]];
             part.finite(pairs.as_flattened())?;
             part.bodies(self, [c.body_a, c.body_b])?;
@@ -77,20 +77,25 @@ impl ContactProblem {
         }
         for (i, joint) in self.joints.iter().enumerate() {
             let place = format!("joints[{i}]");
-            let (part, blocks) = (Part(&place), joint.blocks.len());
+            let (part, blocks) = (ProblemPart(&place), joint.blocks.len());
             part.finite(&joint.reach)?;
             part.bodies(self, [joint.body_a, joint.body_b])?;
             part.require((1..=BLOCKS).contains(&blocks), || {
                 format!("has {blocks} blocks, must have 1 to {BLOCKS}")
             })?;
             for (k, block) in joint.blocks.iter().enumerate() {
-                self.validate_block(Part(&format!("{place}.blocks[{k}]")), joint, block)?;
+                self.validate_block(ProblemPart(&format!("{place}.blocks[{k}]")), joint, block)?;
             }
         }
         Ok(())
     }
 
-    fn validate_block(&self, part: Part, joint: &ProblemJoint, block: &ProblemBlock) -> Result<(), Error> {
+    fn validate_block(
+        &self,
+        part: ProblemPart,
+        joint: &ProblemJoint,
+        block: &ProblemBlock,
+    ) -> Result<(), Error> {
         let rows = block.rows.len();
         part.require((1..=ROWS).contains(&rows), || format!("has {rows} rows, must have 1 to {ROWS}"))?;
         for row in &block.rows {

@@ -7,7 +7,7 @@ use super::{Model, vectors};
 use simpulse::engine::constraints::numerics::matrix::solve_in_place;
 use simpulse::engine::params::Budget;
 use simpulse::engine::solvers::{Variant, xpbd as displacements};
-use simpulse::lab::reference::oracle::{RowOrder, Sweep};
+use simpulse::lab::reference::oracle::{RowOrder, ScalarSweep};
 use simpulse::lab::reference::{DPair, ProblemBody, Velocity};
 
 /// Uncorrected overlap (m), push speed limit (m/s), largest correction of a position sweep (m).
@@ -71,18 +71,18 @@ fn substeps(
 }
 
 /// Velocity sweeps only.
-fn sweeps(model: &mut Model, run: &Run, sweep: Sweep<ScalarRule>) {
+fn sweeps(model: &mut Model, run: &Run, sweep: ScalarSweep<ScalarRule>) {
     substeps(model, run, false, |m| m.sweep(&sweep), |_| ());
 }
 
 /// Velocity sweeps and, after motion, relaxing sweeps.
-fn relaxed(model: &mut Model, run: &Run, sweep: Sweep<ScalarRule>, relax: Sweep<ScalarRule>) {
+fn relaxed(model: &mut Model, run: &Run, sweep: ScalarSweep<ScalarRule>, relax: ScalarSweep<ScalarRule>) {
     let after = |m: &mut Model| (0..run.budget.relax_iterations).for_each(|_| m.sweep(&relax));
     substeps(model, run, sweep.turned, |m| m.sweep(&sweep), after);
 }
 
 /// Velocity sweeps and, after motion, position sweeps.
-fn placed(model: &mut Model, run: &Run, sweep: Sweep<ScalarRule>, position: impl Fn(&mut Model)) {
+fn placed(model: &mut Model, run: &Run, sweep: ScalarSweep<ScalarRule>, position: impl Fn(&mut Model)) {
     let after = |m: &mut Model| (0..run.budget.position_iterations).for_each(|_| position(m));
     substeps(model, run, sweep.turned, |m| m.sweep(&sweep), after);
 }
@@ -109,7 +109,9 @@ pub fn against(solver: &str) -> Option<Against> {
         "symmetric_gs" => Method(symmetric),
         "sor" => Method(sor),
         "local_gs" => Method(local),
-        "nsgs" => Method(|m, r| sweeps(m, r, Sweep { rows: RowOrder::Cone, ..Sweep::new(r.baumgarte()) })),
+        "nsgs" => Method(|m, r| {
+            sweeps(m, r, ScalarSweep { rows: RowOrder::Cone, ..ScalarSweep::new(r.baumgarte()) })
+        }),
         "nncg" => Method(vectors::nncg),
         "anderson" => Method(vectors::anderson),
         "apgd" => Method(vectors::apgd),
@@ -138,7 +140,7 @@ pub fn against(solver: &str) -> Option<Against> {
 }
 
 fn pgs(model: &mut Model, run: &Run) {
-    let mut sweep = Sweep::new(run.baumgarte());
+    let mut sweep = ScalarSweep::new(run.baumgarte());
     match run.undo {
         Some(0) => sweep.rows = RowOrder::PointByPoint,
         Some(1) => sweep.rule = ScalarRule::Baumgarte(0.2, 0.01, CAP),
@@ -159,13 +161,13 @@ fn pgs_substeps(model: &mut Model, run: &Run) {
 
 fn sor(model: &mut Model, run: &Run) {
     let rows = if run.undoes(0) { RowOrder::PointByPoint } else { RowOrder::NormalsFirst };
-    let sweep = Sweep { relax: run.get("relaxation"), rows, ..Sweep::new(run.baumgarte()) };
+    let sweep = ScalarSweep { relax: run.get("relaxation"), rows, ..ScalarSweep::new(run.baumgarte()) };
     sweeps(model, run, sweep);
 }
 
 fn symmetric(model: &mut Model, run: &Run) {
-    let sweep = Sweep::new(run.baumgarte());
-    let back = Sweep { reversed: run.undoes(0), ..sweep };
+    let sweep = ScalarSweep::new(run.baumgarte());
+    let back = ScalarSweep { reversed: run.undoes(0), ..sweep };
     let pair = |m: &mut Model| {
         m.sweep(&sweep);
         m.sweep_in(&back, (0..m.manifolds.len()).rev());
@@ -175,7 +177,7 @@ fn symmetric(model: &mut Model, run: &Run) {
 
 fn local(model: &mut Model, run: &Run) {
     let times = if run.undoes(0) { 1000 } else { run.get("local_iterations") as usize };
-    let sweep = Sweep::new(run.baumgarte());
+    let sweep = ScalarSweep::new(run.baumgarte());
     let solve = |m: &mut Model| {
         m.sweep_in(&sweep, (0..m.manifolds.len()).flat_map(|i| std::iter::repeat_n(i, times)));
     };
@@ -209,7 +211,7 @@ fn shock(model: &mut Model, run: &Run) {
     let of: Vec<usize> = model.manifolds.iter().map(of).collect();
     let mut order: Vec<usize> = (0..of.len()).collect();
     order.sort_by_key(|&i| of[i]);
-    let (inverse, sweep) = (model.inverse.clone(), Sweep::new(run.baumgarte()));
+    let (inverse, sweep) = (model.inverse.clone(), ScalarSweep::new(run.baumgarte()));
     for _ in 0..run.budget.substeps {
         model.accelerate();
         model.warm_start(false);
@@ -231,15 +233,15 @@ fn all_at_once(model: &mut Model, run: &Run, split: bool) {
     let (by_rows, relax) = (split && run.undoes(0), run.find("relaxation").unwrap_or(1.0));
     let mut spring = run.spring(1.0 / 3.0, model.h);
     spring.scaled = split || !run.undoes(0);
-    let [soft, rigid] =
-        [ScalarRule::Soft(spring), ScalarRule::Rigid].map(|rule| Sweep { relax, ..Sweep::new(rule) });
+    let [soft, rigid] = [ScalarRule::Soft(spring), ScalarRule::Rigid]
+        .map(|rule| ScalarSweep { relax, ..ScalarSweep::new(rule) });
     let after =
         |m: &mut Model| (0..run.budget.relax_iterations).for_each(|_| m.jacobi(&rigid, split, by_rows));
     substeps(model, run, false, |m| m.jacobi(&soft, split, by_rows), after);
 }
 
 fn pgs_ngs(model: &mut Model, run: &Run) {
-    let mut sweep = Sweep::new(if run.undoes(1) { ScalarRule::Closed } else { ScalarRule::Rigid });
+    let mut sweep = ScalarSweep::new(if run.undoes(1) { ScalarRule::Closed } else { ScalarRule::Rigid });
     if run.undoes(0) {
         sweep.rows = RowOrder::FrictionFirst;
     }
@@ -248,7 +250,7 @@ fn pgs_ngs(model: &mut Model, run: &Run) {
 
 fn pgs_ngs_block(model: &mut Model, run: &Run) {
     let rule = if run.undoes(0) { ScalarRule::Closed } else { ScalarRule::Rigid };
-    placed(model, run, Sweep { rows: RowOrder::BlockLast(1e-3), ..Sweep::new(rule) }, |m| {
+    placed(model, run, ScalarSweep { rows: RowOrder::BlockLast(1e-3), ..ScalarSweep::new(rule) }, |m| {
         if run.undoes(1) {
             positions_in_pairs(m, run.get("correction"), SLOP, MOST);
         } else {
@@ -258,7 +260,7 @@ fn pgs_ngs_block(model: &mut Model, run: &Run) {
 }
 
 fn tgs_ngs(model: &mut Model, run: &Run) {
-    let sweep = Sweep { turned: run.undoes(0), ..Sweep::new(ScalarRule::Rigid) };
+    let sweep = ScalarSweep { turned: run.undoes(0), ..ScalarSweep::new(ScalarRule::Rigid) };
     placed(model, run, sweep, |m| positions(m, run.get("correction"), SLOP, MOST, true));
 }
 
@@ -270,16 +272,16 @@ fn soft(model: &mut Model, run: &Run, share: f64, turned: bool) {
     if run.undoes(1) {
         (spring.omega, spring.cap) = (ScalarSpring::new(30.0, 0.25, 10.0, 0.0, model.h).omega, 2.0);
     }
-    let [soft, rigid] =
-        [ScalarRule::Soft(spring), ScalarRule::Rigid].map(|rule| Sweep { turned, ..Sweep::new(rule) });
+    let [soft, rigid] = [ScalarRule::Soft(spring), ScalarRule::Rigid]
+        .map(|rule| ScalarSweep { turned, ..ScalarSweep::new(rule) });
     relaxed(model, run, soft, rigid);
 }
 
 /// Soft sweeps without friction, then rigid ones with it.
 fn without_first_friction(model: &mut Model, run: &Run, rows: RowOrder) {
     let spring = ScalarRule::Soft(run.spring(0.125, model.h));
-    let soft = Sweep { friction: false, rows, ..Sweep::new(spring) };
-    relaxed(model, run, soft, Sweep { rows, ..Sweep::new(ScalarRule::Rigid) });
+    let soft = ScalarSweep { friction: false, rows, ..ScalarSweep::new(spring) };
+    relaxed(model, run, soft, ScalarSweep { rows, ..ScalarSweep::new(ScalarRule::Rigid) });
 }
 
 /// `shim` without its statics, frames, impacts and jams.
@@ -290,12 +292,12 @@ fn shim(model: &mut Model, run: &Run) {
         ..ScalarSpring::new(rate, 1.0, run.get("damping_ratio"), run.get("push_speed"), model.h)
     };
     let [soft, rigid] = [ScalarRule::Soft(spring), ScalarRule::Rigid]
-        .map(|rule| Sweep { rows: RowOrder::BlockFirst(1e-3), ..Sweep::new(rule) });
+        .map(|rule| ScalarSweep { rows: RowOrder::BlockFirst(1e-3), ..ScalarSweep::new(rule) });
     relaxed(model, run, soft, rigid);
 }
 
 fn projection(model: &mut Model, run: &Run) {
-    let touching = Sweep { friction: false, ..Sweep::new(ScalarRule::Touching(SLOP)) };
+    let touching = ScalarSweep { friction: false, ..ScalarSweep::new(ScalarRule::Touching(SLOP)) };
     for _ in 0..run.budget.substeps {
         model.l.fill([0.0; 2]);
         model.accelerate();
@@ -311,12 +313,12 @@ fn split_impulse(model: &mut Model, run: &Run) {
         true => (ScalarRule::Shallow(share, 0.04), ScalarRule::Deep(share, 0.04)),
         false => (ScalarRule::Rigid, ScalarRule::Baumgarte(share, 0.0, CAP)),
     };
-    let push = Sweep { friction: false, ..Sweep::new(push) };
+    let push = ScalarSweep { friction: false, ..ScalarSweep::new(push) };
     substeps(
         model,
         run,
         false,
-        |m| m.sweep(&Sweep::new(rigid)),
+        |m| m.sweep(&ScalarSweep::new(rigid)),
         |m| {
             let kept = (m.v.clone(), m.l.clone());
             m.v.fill([0.0; 3]);
@@ -339,7 +341,7 @@ fn tgs_sticky(model: &mut Model, run: &Run) {
             false => ScalarRule::Baumgarte(fraction, 0.0, run.get("push_speed")),
         };
         for range in m.manifolds.clone() {
-            m.contact(range.clone(), &Sweep { friction: false, turned, ..Sweep::new(rule) });
+            m.contact(range.clone(), &ScalarSweep { friction: false, turned, ..ScalarSweep::new(rule) });
             let total: f64 = range.clone().map(|i| m.l[i][0]).sum();
             let share = if run.undoes(0) { 2.0 } else { range.len() as f64 };
             for i in range {
@@ -408,7 +410,7 @@ fn physx(model: &mut Model, run: &Run) {
 }
 
 fn jolt(model: &mut Model, run: &Run) {
-    let normals = Sweep { friction: false, ..Sweep::new(ScalarRule::Rigid) };
+    let normals = ScalarSweep { friction: false, ..ScalarSweep::new(ScalarRule::Rigid) };
     let sweep = |m: &mut Model| {
         for range in m.manifolds.clone() {
             // One friction row, at the mean of the points.

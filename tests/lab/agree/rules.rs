@@ -1,7 +1,7 @@
 //! How sources treat gaps: rules of normal rows, and corrections of positions.
 
 use super::Model;
-use simpulse::lab::reference::oracle::{Line, PointRows, Rule};
+use simpulse::lab::reference::oracle::{GapRule, Line, SidesOfPoint};
 use std::f64::consts::TAU;
 
 /// How a normal row treats the gap s.
@@ -55,7 +55,7 @@ fn against_static(model: &Model, i: usize) -> bool {
     [c.body_a, c.body_b].into_iter().any(|body| !body.is_some_and(dynamic))
 }
 
-impl Rule for ScalarRule {
+impl GapRule for ScalarRule {
     fn line(self, model: &Model, i: usize) -> Line {
         let (s, h, rigid) = (model.place(i)[0], model.h, Line::rigid);
         match self {
@@ -96,7 +96,7 @@ pub fn positions(model: &mut Model, share: f64, slop: f64, most: f64, turned: bo
 pub fn positions_in_pairs(model: &mut Model, share: f64, slop: f64, most: f64) {
     for m in model.manifolds.clone() {
         let error = |model: &Model, i: usize| (share * (model.place(i)[0] + slop)).clamp(-most, 0.0);
-        let rows: Vec<PointRows> = m.clone().map(|i| model.rows(i, true)).collect();
+        let rows: Vec<SidesOfPoint> = m.clone().map(|i| model.rows(i, true)).collect();
         let c: Vec<f64> = m.clone().map(|i| error(model, i)).collect();
         let k = |a: usize, b: usize| model.coupling((&rows[a], 0), (&rows[b], 0));
         let p = match c[..] {

@@ -4,12 +4,12 @@ use super::Model;
 use super::methods::{CAP, Run};
 use super::rules::ScalarRule;
 use simpulse::lab::reference::DPair;
-use simpulse::lab::reference::iterate::{Acceleration, Anderson, Conjugate, dot, plus};
-use simpulse::lab::reference::oracle::{Rule, Sweep};
+use simpulse::lab::reference::iterate::{Acceleration, Anderson, ConjugateSweeps, dot, plus};
+use simpulse::lab::reference::oracle::{GapRule, ScalarSweep};
 
 /// Sweeps with an extrapolation after each; with `plain`, not after the last.
 fn accelerated(model: &mut Model, run: &Run, mut by: impl Acceleration, plain: bool) {
-    let (sweep, count) = (Sweep::new(run.baumgarte()), run.budget.velocity_iterations);
+    let (sweep, count) = (ScalarSweep::new(run.baumgarte()), run.budget.velocity_iterations);
     model.accelerate();
     model.warm_start(false);
     for k in 0..count {
@@ -24,7 +24,7 @@ fn accelerated(model: &mut Model, run: &Run, mut by: impl Acceleration, plain: b
 }
 
 pub(super) fn nncg(model: &mut Model, run: &Run) {
-    accelerated(model, run, Conjugate::default(), !run.undoes(0));
+    accelerated(model, run, ConjugateSweeps::default(), !run.undoes(0));
 }
 
 pub(super) fn anderson(model: &mut Model, run: &Run) {
