@@ -198,6 +198,8 @@ impl Agreement {
 #[test]
 fn solvers_agree_with_their_sources() {
     let mut wrong = String::new();
+    let rows = include_str!("sources.md").lines().filter(|line| line.starts_with("| `")).count();
+    assert_eq!(rows, VARIANTS.len(), "rows of tests/lab/agree/sources.md");
     for variant in &VARIANTS {
         let a = agreement(variant);
         println!("{}", a.text());
