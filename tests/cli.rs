@@ -332,7 +332,6 @@ fn every_csv_header_is_documented() {
     for words in [
         "study --quick --scenes stack:2 --solvers pgs --lanes 1 --out o",
         "converge stack:3 --step 20 --solvers pgs --repeats 0 --out o",
-        "agree --solvers pgs --out o",
         "growth --contacts 1e2,3e2 --settle 2 --repeats 1 --out o",
         "run stack:2 --steps 3 --state o/state.csv --contacts o/contacts.csv",
         "run four_bar --steps 3 --joints o/joints.csv",
@@ -374,7 +373,7 @@ fn data_is_printed_as_json_where_that_is_asked_for() {
     assert_eq!(cells["results"][0]["passed"], true);
     let converge = ["converge", "stack:3", "--solvers", "pgs", "--repeats", "0", "--json"];
     assert!(json(&converge)["gauss_seidel_rate"].as_f64().unwrap() < 1.0);
-    let frozen = json(&["capture", "stack:3", "--out", "s.frozen", "--json"]);
+    let frozen = json(&["converge", "stack:3", "--freeze", "s.frozen", "--json"]);
     assert!(frozen["certificate"].is_object(), "{frozen}");
     let profile = ["profile", "stack:5", "--seconds", "0.2", "--settle", "3", "--json"];
     assert!(json(&profile)["phases"][0]["limit"].is_string());

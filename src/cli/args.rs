@@ -1,8 +1,6 @@
 //! The command line: commands and their options.
 
 use super::advise::AdviseArgs;
-use super::agree::AgreeArgs;
-use super::capture::CaptureArgs;
 use super::compare::CompareArgs;
 use super::converge::ConvergeArgs;
 use super::merge::MergeArgs;
@@ -59,10 +57,8 @@ pub enum Command {
     Run(RunArgs),
     Report(ReportArgs),
     Advise(AdviseArgs),
-    Capture(CaptureArgs),
     Converge(ConvergeArgs),
     Verify(VerifyArgs),
-    Agree(AgreeArgs),
     Profile(ProfileArgs),
     Savings(SavingsArgs),
     /// List the scenes

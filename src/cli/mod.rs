@@ -4,9 +4,7 @@
 //! request, 130 a signal.
 
 pub mod advise;
-pub mod agree;
 pub mod args;
-pub mod capture;
 pub mod compare;
 pub mod converge;
 pub mod interrupt;
@@ -100,10 +98,8 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Report(args)) => report::run(&args),
         Some(Command::Advise(args)) => advise::run(&args),
-        Some(Command::Capture(args)) => capture::run(&args),
         Some(Command::Converge(args)) => converge::run(&args),
         Some(Command::Verify(args)) => verify::run(&args),
-        Some(Command::Agree(args)) => agree::run(&args),
         Some(Command::Profile(args)) => profile::run(&args),
         Some(Command::Savings(args)) => savings::run(&args),
         Some(Command::Scenes(args)) => scenes(&args),

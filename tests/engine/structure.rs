@@ -53,7 +53,7 @@ const LAB: &[&[&str]] = &[
     &["recording"],
     &["verify", "study", "converge"],
     &["advise", "report"],
-    &["ablate", "agree", "profile", "compare", "torture"],
+    &["ablate", "profile", "compare", "torture"],
 ];
 
 #[test]
