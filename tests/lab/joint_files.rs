@@ -42,7 +42,11 @@ fn bad_joints_are_refused_in_one_line_with_place_and_value() {
         (r#"{"motor": {"a": 0, "b": 1, "max_torque": 1e39}}"#, "joints[0].motor.max_torque: ", "1e39"),
         (r#"{"revolute": {"a": 0, "b": 1, "anchor_a": [1e39, 0]}}"#, "joints[0].revolute.anchor_a", "1e39"),
         (r#"{"weld": {"a": 0, "b": 1, "break_load": [1, -5]}}"#, "joints[0].weld.break_load[1]: ", "-5"),
-        (r#"{"hinge": {"a": 0, "b": 1}}"#, "joints[0]", "unknown variant `hinge`, expected one of `revolute`, `prismatic`"),
+        (
+            r#"{"hinge": {"a": 0, "b": 1}}"#,
+            "joints[0]",
+            "unknown variant `hinge`, expected one of `revolute`, `prismatic`",
+        ),
         (r#"{"revolute": {"a": 0, "b": 1, "limit": [0, 1]}}"#, "joints[0]", "unknown field `limit`"),
         (r#"{"filter": {"a": 0, "b": 1, "limits": [0, 1]}}"#, "joints[0]", "unknown field `limits`"),
         (r#"{"revolute": {"b": 1}}"#, "joints[0]", "missing field `a`"),

@@ -203,7 +203,8 @@ impl Scene {
     pub fn from_json(text: &str, path: &Path) -> Result<Self, Error> {
         let failed = |message| Error::Format { path: path.to_path_buf(), message };
         let mut reader = serde_json::Deserializer::from_str(text);
-        let scene: Scene = serde_path_to_error::deserialize(&mut reader).map_err(|e| failed(at_place(text, &e)))?;
+        let scene: Scene =
+            serde_path_to_error::deserialize(&mut reader).map_err(|e| failed(at_place(text, &e)))?;
         reader.end().map_err(|e| failed(e.to_string()))?;
         scene.validate().map_err(|e| failed(e.to_string()))?;
         Ok(scene)
