@@ -18,7 +18,6 @@ mod metrics;
 mod piles;
 mod plastic;
 mod profile;
-mod recycling;
 mod rest;
 mod rivals;
 mod saved;

@@ -3,12 +3,12 @@
 //! **Source.** `catto2024box2d` (version 3.2); the rows are those of [`super::soft_step`].
 //!
 //! **Departures.** Restitution is this crate's ([`crate::engine::constraints::impacts::restitution`]), which
-//! conserves energy; Box2D returns e times the approach speed. Manifolds of bodies that hardly moved are kept
-//! as in Box2D, except those of discs (`box2d/recycle.rs`). Contacts are solved in the order of this crate's
+//! conserves energy; Box2D returns e times the approach speed. Contacts of discs are not
+//! [frozen](crate::engine::narrowphase::frozen). Contacts are solved in the order of this crate's
 //! colors.
 //!
 //! **Agreement.** The source at its best: 4 substeps of 1 and 1 sweep, 30 Hz, ζ 10, 3 m/s. Here: 4 substeps of 1
-//! iteration, 1 relaxing sweep, contact_hertz 30, push_speed 3, recycle_distance 0.05. Apart from the source's method
+//! iteration, 1 relaxing sweep, contact_hertz 30, push_speed 3. Apart from the source's method
 //! in `f64` over 10 substeps by less than 6e-5: `simpulse agree --solvers box2d`.
 //!
 //! **Cost.** Per step 1 warm start; per substep 2 body passes, `velocity_iterations` soft sweeps
@@ -17,18 +17,12 @@
 //! **Fails when** [`super::soft_step`] does. Sliding and sticking are less accurate: in each substep friction
 //! is solved only once, on top of the normal velocities that the springs left.
 
-mod recycle;
-
 use super::{Uses, Variant};
 use crate::engine::clock::Phase;
 use crate::engine::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
-use crate::engine::constraints::step::{Collision, CollisionScene};
-use crate::engine::constraints::{ImpactLaw, Passes, Solver};
-use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, LINEAR_SLOP, Parameter};
-use recycle::Recycled;
-
-/// Index of `recycle_distance` among the parameters.
-const RECYCLE_DISTANCE: usize = 2;
+use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
+use crate::engine::narrowphase::frozen::FreezeLimits;
+use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -38,52 +32,13 @@ pub static SOLVER: Variant = Variant {
     budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
     iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..standard },
-    parameters: &[
-        Parameter::CONTACT_HERTZ,
-        Parameter::PUSH_SPEED,
-        Parameter {
-            name: "recycle_distance",
-            unit: "m",
-            default: 10.0 * LINEAR_SLOP,
-            range: [0.0, 1.0],
-            meaning: "relative motion within which two bodies keep their manifold; 0: manifolds are never kept",
-            trials: &[],
-        },
-    ],
+    parameters: &[Parameter::CONTACT_HERTZ, Parameter::PUSH_SPEED],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
     impacts: ImpactLaw::BOX2D,
-    make: Variant::made_by(|| Box::new(Box2d::default())),
+    frozen: Some(FreezeLimits::BOX2D),
+    make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
-
-/// State from step to step.
-#[derive(Clone, Debug, Default)]
-struct Box2d {
-    recycled: Recycled,
-}
-
-impl Solver for Box2d {
-    fn before_collision(&mut self, scene: &mut CollisionScene<'_>, collision: &mut Collision) {
-        let distance = scene.parameters[RECYCLE_DISTANCE];
-        self.recycled.update(scene.candidates, scene.contacts, distance, &mut collision.keep);
-    }
-
-    fn after_collision(&mut self, scene: &mut CollisionScene<'_>) {
-        self.recycled.take_up(scene.candidates, scene.contacts);
-    }
-
-    fn step(&mut self, passes: &mut Passes<'_>) {
-        step(passes);
-    }
-
-    fn boxed(&self) -> Box<dyn Solver> {
-        Box::new(self.clone())
-    }
-
-    fn held_bytes(&self) -> usize {
-        self.recycled.held_bytes()
-    }
-}
 
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());

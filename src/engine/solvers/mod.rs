@@ -32,6 +32,7 @@ use crate::engine::constraints::{ImpactLaw, Passes, Schedule, Solver, StepInput,
 use crate::engine::contacts::Contact;
 use crate::engine::error::Error;
 use crate::engine::lanes::LaneWidth;
+use crate::engine::narrowphase::frozen::FreezeLimits;
 use crate::engine::params::{Budget, MAX_PARAMETERS, Mechanism, Parameter, Parameters};
 
 pub mod admm;
@@ -195,6 +196,8 @@ pub struct Variant {
     pub softness: Option<fn(&Parameters, f32) -> [f32; 2]>,
     /// Impact law of its source.
     pub impacts: ImpactLaw,
+    /// Limits within which its source [freezes](crate::engine::narrowphase::frozen) contacts; `None` if it does not.
+    pub frozen: Option<FreezeLimits>,
     /// Default of [continuous collision](crate::engine::continuous).
     pub continuous: bool,
     /// Numbers kept from step to step, in addition to impulses.
@@ -227,6 +230,7 @@ impl Variant {
         mechanisms: &[],
         softness: None,
         impacts: ImpactLaw::Bias,
+        frozen: None,
         continuous: false,
         kept: KeptSize::NONE,
         holds_no_joints: None,

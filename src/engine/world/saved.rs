@@ -16,6 +16,7 @@ use crate::engine::constraints::records::kept::Kept;
 use crate::engine::constraints::{Features, Impacts};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::LaneWidth;
+use crate::engine::narrowphase::frozen::Freezing;
 use crate::engine::params::{Budget, Parameters, Without};
 use crate::engine::shapes::{MassProperties, Shape};
 use crate::engine::solvers;
@@ -39,6 +40,8 @@ struct SavedSettings {
     #[serde(default)]
     without: Vec<String>,
     impacts: Impacts,
+    #[serde(default)]
+    frozen: Freezing,
     record_impulses: bool,
     contact_events: bool,
     observe_rule: bool,
@@ -68,6 +71,7 @@ impl Serialize for Settings {
                 names.filter(|(i, _)| s.without.leaves_out(*i)).map(|(_, m)| m.name.into()).collect()
             },
             impacts: s.impacts,
+            frozen: s.frozen,
             record_impulses: s.record_impulses,
             contact_events: s.contact_events,
             observe_rule: s.observe_rule,
@@ -110,6 +114,7 @@ impl<'de> Deserialize<'de> for Settings {
             length_unit: s.length_unit,
             parameters: s.parameters,
             impacts: s.impacts,
+            frozen: s.frozen,
             record_impulses: s.record_impulses,
             contact_events: s.contact_events,
             observe_rule: s.observe_rule,

@@ -4,6 +4,7 @@ use crate::engine::broadphase::BroadPhaseKind;
 use crate::engine::constraints::kernels::motion::{Integrator, RotationUpdate};
 use crate::engine::constraints::{Features, ImpactLaw, Impacts};
 use crate::engine::lanes::{LaneWidth, native_width};
+use crate::engine::narrowphase::frozen::{FreezeLimits, Freezing};
 use crate::engine::params::{Budget, Parameters, Without};
 use crate::engine::solvers::Variant;
 
@@ -87,6 +88,8 @@ pub struct Settings {
     /// How impacts are solved: by the solver's own law, by waves of impacts before the step, or without
     /// bounce.
     pub impacts: Impacts,
+    /// Whether contacts keep their normal and lever arms while bodies hardly move.
+    pub frozen: Freezing,
     /// Sum impulses over the substeps into [`crate::engine::contacts::Contact::step_impulse`].
     pub record_impulses: bool,
     /// Find [`World::contact_events`](crate::engine::world::World::contact_events) after each step.
@@ -124,6 +127,7 @@ impl Settings {
             parameters: solver.defaults(),
             without: Without::default(),
             impacts: Impacts::Own,
+            frozen: Freezing::Own,
             record_impulses: false,
             contact_events: false,
             observe_rule: false,
@@ -144,6 +148,12 @@ impl Settings {
     /// The impact law of a step.
     pub fn impact_law(&self) -> ImpactLaw {
         self.impacts.law(self.solver.impacts)
+    }
+
+    /// Limits within which contacts are frozen (m, rad); `None` if they are not.
+    pub(crate) fn freezing(&self) -> Option<FreezeLimits> {
+        let limits = self.frozen.limits(self.solver.frozen)?;
+        Some(FreezeLimits { distance: limits.distance * self.length_unit, ..limits })
     }
 
     /// The solver's parameters, with those in m and m/s multiplied by the length unit.
