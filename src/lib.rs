@@ -69,7 +69,7 @@
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 #[doc(inline)]
-pub use simpulse_engine::engine;
+pub use simpulse_engine as engine;
 
 #[cfg(feature = "lab")]
 pub mod lab;

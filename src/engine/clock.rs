@@ -72,9 +72,8 @@ impl Phase {
 /// Time of each phase of the last step, and of the whole step.
 ///
 /// ```
-/// # use simpulse_engine as simpulse;
-/// use simpulse::engine::clock::Phase;
-/// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+/// use simpulse_engine::clock::Phase;
+/// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
 /// let mut world = World::new(Settings { timed: true, ..Settings::new(solvers::find("pgs")?) });
 /// world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::circle(0.5)?))?;
 /// world.step()?;
@@ -115,7 +114,7 @@ pub struct Requested {
 pub struct PhaseFilter {
     /// The only phase that runs; `None` runs all.
     pub only: Option<Phase>,
-    /// Whether the phase runs in one lane that counts, [`crate::engine::lanes::Counted`].
+    /// Whether the phase runs in one lane that counts, [`crate::lanes::Counted`].
     pub counted: bool,
 }
 

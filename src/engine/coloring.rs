@@ -19,7 +19,7 @@
 //!
 //! **Source:** Catto 2024, "SIMD Matters" (`catto2024simd`).
 
-use crate::engine::lanes::held;
+use crate::lanes::held;
 
 /// Marks a side that any number of edges of a color may share: a static or kinematic body, which is read but
 /// never written.

@@ -39,8 +39,7 @@ pub struct Manifold {
 /// Two shapes close enough to touch: eight quads, two cache lines.
 ///
 /// ```
-/// # use simpulse_engine as simpulse;
-/// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+/// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
 /// let settings = Settings { record_impulses: true, ..Settings::new(solvers::find("shim")?) };
 /// let mut world = World::new(settings);
 /// world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(10.0, 1.0)?))?;

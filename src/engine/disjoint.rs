@@ -1,6 +1,6 @@
 //! Disjoint sets (union–find).
 
-use crate::engine::lanes::held;
+use crate::lanes::held;
 
 /// A partition of the numbers below a count into sets. Reuses its memory.
 #[derive(Clone, Debug, Default)]

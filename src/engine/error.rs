@@ -1,7 +1,7 @@
 //! Errors that the engine returns for invalid input.
 //!
 //! Hot loops are infallible. A simulation that diverges is an *outcome*
-//! ([`crate::engine::world::Divergence`]), not an error.
+//! ([`crate::world::Divergence`]), not an error.
 
 use std::fmt;
 

@@ -1,7 +1,7 @@
 //! Tuning constants with their units, and the budget of a step.
 //!
 //! Lengths and speeds are chosen for bodies of about a meter. For other sizes, a world's
-//! [`length_unit`](crate::engine::world::Settings::length_unit) multiplies all of them except gravity and
+//! [`length_unit`](crate::world::Settings::length_unit) multiplies all of them except gravity and
 //! density.
 
 /// Overlap that position correction leaves uncorrected (m), so that resting contacts persist. Larger: visible
@@ -66,7 +66,7 @@ pub const DIVERGED_SPEED: f32 = 1.0e5;
 /// The work of one step.
 ///
 /// Each solver uses the fields of its schedule and ignores the rest; its row in
-/// [`crate::engine::solvers::VARIANTS`] lists them.
+/// [`crate::solvers::VARIANTS`] lists them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Budget {

@@ -1,9 +1,9 @@
 //! Definitions of bodies and shapes, and the valid ranges of their values.
 
 use super::BodyKind;
-use crate::engine::error::Error;
-use crate::engine::params::{DEFAULT_DENSITY, DEFAULT_FRICTION};
-use crate::engine::shapes::{MassProperties, Shape, combine};
+use crate::error::Error;
+use crate::params::{DEFAULT_DENSITY, DEFAULT_FRICTION};
+use crate::shapes::{MassProperties, Shape, combine};
 use glam::Vec2;
 
 /// Maximum friction coefficient (1), so that the product of two is finite in `f32`.
@@ -12,15 +12,14 @@ pub const MAX_FRICTION: f64 = 1e9;
 /// A shape and its surface properties.
 ///
 /// ```
-/// # use simpulse_engine as simpulse;
-/// use simpulse::engine::bodies::ShapeDef;
+/// use simpulse_engine::bodies::ShapeDef;
 ///
 /// let ice = ShapeDef::rectangle(0.5, 0.25)?.with_friction(0.02).with_density(917.0);
 /// let wheel = ShapeDef::circle(0.3)?.at([0.6, -0.25]).with_restitution(0.4);
 /// let error = ShapeDef::circle(-1.0).unwrap_err();
 /// assert_eq!(error.to_string(), "circle: radius = -1 is not within 1e-9 to 1e9 m");
 /// # let _ = (ice, wheel);
-/// # Ok::<(), simpulse::engine::error::Error>(())
+/// # Ok::<(), simpulse_engine::error::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShapeDef {
@@ -37,14 +36,13 @@ pub struct ShapeDef {
 /// Definition of a body: its shapes and initial state.
 ///
 /// ```
-/// # use simpulse_engine as simpulse;
-/// use simpulse::engine::bodies::{BodyDef, ShapeDef};
+/// use simpulse_engine::bodies::{BodyDef, ShapeDef};
 ///
 /// let crate_ = BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?).with_velocity([2.0, 0.0]);
 /// // Or as a plain struct:
 /// let same = BodyDef { velocity: [2.0, 0.0], shapes: crate_.shapes.clone(), ..BodyDef::dynamic([0.0, 0.5]) };
 /// assert_eq!(crate_, same);
-/// # Ok::<(), simpulse::engine::error::Error>(())
+/// # Ok::<(), simpulse_engine::error::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyDef {
@@ -66,7 +64,7 @@ pub struct BodyDef {
     pub angular_damping: f64,
     /// Bodies of the same non-zero group do not collide.
     pub group: i32,
-    /// Whether dynamic bodies also stop it in continuous collision, see [`crate::engine::continuous`].
+    /// Whether dynamic bodies also stop it in continuous collision, see [`crate::continuous`].
     pub bullet: bool,
     /// Shapes, rigidly connected.
     pub shapes: Vec<ShapeDef>,
@@ -177,8 +175,7 @@ impl BodyDef {
     /// A body that keeps its given velocity in every collision, at `position` (m), without shapes.
     ///
     /// ```
-    /// # use simpulse_engine as simpulse;
-    /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
     /// let mut world = World::new(Settings::new(solvers::find("shim")?));
     /// let belt = BodyDef::kinematic([0.0, -1.0]).with(ShapeDef::rectangle(50.0, 1.0)?).with_velocity([1.0, 0.0]);
     /// world.add_body(&belt)?;

@@ -1,11 +1,11 @@
 //! Bodies: their definitions ([`BodyDef`], [`ShapeDef`]), their handles ([`BodyHandle`]), and their state as
 //! a structure of arrays, castable to lanes ([`Bodies`]).
 
-use crate::engine::lanes::LaneVec;
-use crate::engine::shapes::{MassProperties, Pose};
+use crate::lanes::LaneVec;
+use crate::shapes::{MassProperties, Pose};
 use glam::Vec2;
 
-pub(in crate::engine) mod def;
+pub(crate) mod def;
 
 pub use def::{BodyDef, MAX_FRICTION, ShapeDef};
 
@@ -22,7 +22,7 @@ pub enum BodyKind {
     Dynamic,
 }
 
-/// Identifies a body of a [`World`](crate::engine::world::World).
+/// Identifies a body of a [`World`](crate::world::World).
 ///
 /// A handle stays valid until its body is removed, whatever else is added or removed. The index of a removed
 /// body may be reused. The generation distinguishes the two, so an old handle gives an error and never refers
@@ -67,7 +67,7 @@ pub struct Bodies {
     /// Inverse inertia (1/(kg·m²)), zero for static and kinematic bodies.
     pub inv_inertia: LaneVec,
     /// Force applied in every step until it is changed, x (N). For a single step:
-    /// [`World::apply_force`](crate::engine::world::World::apply_force).
+    /// [`World::apply_force`](crate::world::World::apply_force).
     pub force_x: LaneVec,
     /// Force applied in every step until it is changed, y (N).
     pub force_y: LaneVec,

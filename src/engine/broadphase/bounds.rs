@@ -32,10 +32,10 @@
 //! **Source:** boxes with a margin, Catto 2019 (`catto2019`). **Departure:** the test of (1).
 
 use super::Proxy;
-use crate::engine::bodies::{Bodies, BodyKind};
-use crate::engine::lanes::{LaneVec, held};
-use crate::engine::params::{AABB_MARGIN, MAX_POLYGON_VERTICES, SPECULATIVE_DISTANCE};
-use crate::engine::shapes::{Aabb, Pose, Shape};
+use crate::bodies::{Bodies, BodyKind};
+use crate::lanes::{LaneVec, held};
+use crate::params::{AABB_MARGIN, MAX_POLYGON_VERTICES, SPECULATIVE_DISTANCE};
+use crate::shapes::{Aabb, Pose, Shape};
 use glam::Vec2;
 use wide::{f32x8, f32x16};
 

@@ -27,7 +27,7 @@
 
 use super::Proxy;
 use super::sort::PairSort;
-use crate::engine::lanes::held;
+use crate::lanes::held;
 use glam::Vec2;
 use std::ops::Range;
 

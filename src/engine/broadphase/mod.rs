@@ -33,7 +33,7 @@ pub use hash_grid::HashGrid;
 pub use region::Region;
 pub use tree::Tree;
 
-use crate::engine::shapes::Aabb;
+use crate::shapes::Aabb;
 
 /// A shape in the broad phase.
 #[derive(Clone, Copy, Debug, PartialEq)]

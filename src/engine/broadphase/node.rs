@@ -1,6 +1,6 @@
 //! Sixteen boxes that are tested at once.
 
-use crate::engine::lanes::Block;
+use crate::lanes::Block;
 use wide::f32x16;
 
 /// Number of children of a node.

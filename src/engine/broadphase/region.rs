@@ -2,7 +2,7 @@
 
 use super::node::{FAN, Node};
 use super::{BroadPhase, Proxy};
-use crate::engine::shapes::Aabb;
+use crate::shapes::Aabb;
 use glam::Vec2;
 use wide::f32x16;
 

@@ -29,7 +29,7 @@ use super::Proxy;
 use super::curve::{BITS, hilbert};
 use super::node::{BITS_OF_FAN, FAN, Node};
 use super::sort::PairSort;
-use crate::engine::lanes::held;
+use crate::lanes::held;
 use wide::f32x16;
 
 /// The order is rebuilt when the sum of the leaves' perimeters has grown by this factor.
@@ -380,7 +380,7 @@ fn meet(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::shapes::Aabb;
+    use crate::shapes::Aabb;
     use glam::Vec2;
 
     /// A lattice of boxes that shears from frame to frame and changes in number.

@@ -56,9 +56,9 @@
 //! So a rod with its tip on a floor can tip over: its tip does not get in, and its middle and its other end
 //! are far from the floor.
 
-use crate::engine::contacts::{Manifold, ManifoldPoint};
-use crate::engine::narrowphase::Collider;
-use crate::engine::shapes::{Pose, Shape};
+use crate::contacts::{Manifold, ManifoldPoint};
+use crate::narrowphase::Collider;
+use crate::shapes::{Pose, Shape};
 use glam::Vec2;
 
 /// Maximum number of axes along which a pair advances. A pair that reaches this limit or the next one stops
@@ -188,8 +188,8 @@ fn while_touching(manifold: &Manifold, b: &Mover, width: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::narrowphase::collide;
-    use crate::engine::params::LINEAR_SLOP;
+    use crate::narrowphase::collide;
+    use crate::params::LINEAR_SLOP;
 
     /// A shape and its motion.
     struct Moving<'s>(&'s Shape, Mover);

@@ -1,13 +1,13 @@
 //! Continuous collision: fast bodies stop where they would pass through a surface.
 //!
-//! A contact exists only once two shapes are [near](crate::engine::params::SPECULATIVE_DISTANCE) each other.
+//! A contact exists only once two shapes are [near](crate::params::SPECULATIVE_DISTANCE) each other.
 //! A body that moves farther in a step than half its own width may get past the middle of another body, or
 //! completely past it, before there is a contact. So after the solver has moved the bodies, and before their
 //! poses are written, the path of each such body is traced and cut where its center would pass a surface; the
 //! next step finds a contact there. The velocity is unchanged, so restitution and friction act as usual.
 //!
 //! Static and kinematic shapes stop every fast body; dynamic shapes stop bullets only
-//! ([`BodyDef::bullet`](crate::engine::bodies::BodyDef::bullet)). Rotation is not traced: a spinning rod
+//! ([`BodyDef::bullet`](crate::bodies::BodyDef::bullet)). Rotation is not traced: a spinning rod
 //! whose center does not move may pass through a thin wall. In addition, the center of a slow body never
 //! enters a static shape, even under pressure.
 //!
@@ -23,12 +23,12 @@
 mod advance;
 mod press;
 
-use crate::engine::bodies::{Bodies, BodyKind};
-use crate::engine::broadphase::Proxy;
-use crate::engine::contacts::Contact;
-use crate::engine::disjoint::DisjointSets;
-use crate::engine::lanes::{BodyRow, held};
-use crate::engine::shapes::{Aabb, Pose, Shape};
+use crate::bodies::{Bodies, BodyKind};
+use crate::broadphase::Proxy;
+use crate::contacts::Contact;
+use crate::disjoint::DisjointSets;
+use crate::lanes::{BodyRow, held};
+use crate::shapes::{Aabb, Pose, Shape};
 use advance::{Mover, impact};
 use glam::Vec2;
 use std::ops::Range;

@@ -12,9 +12,9 @@
 //! displacement is limited by (1), and the inward velocity is removed; bodies are never pushed out. The slop
 //! term covers bodies thinner than the overlap that solvers leave.
 
-use crate::engine::bodies::{Bodies, BodyKind};
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::BodyRow;
+use crate::bodies::{Bodies, BodyKind};
+use crate::contacts::Contact;
+use crate::lanes::BodyRow;
 use glam::Vec2;
 
 /// Limits displacements into static shapes by (1); `safe_squared` is w² by body.
@@ -43,10 +43,10 @@ pub fn hold(bodies: &Bodies, contacts: &[Contact], safe_squared: &[f32], slop: f
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::bodies::BodyDef;
-    use crate::engine::contacts::{Manifold, ManifoldPoint};
-    use crate::engine::params::LINEAR_SLOP;
-    use crate::engine::shapes::MassProperties;
+    use crate::bodies::BodyDef;
+    use crate::contacts::{Manifold, ManifoldPoint};
+    use crate::params::LINEAR_SLOP;
+    use crate::shapes::MassProperties;
 
     #[test]
     fn only_the_way_into_a_static_body_is_cut_and_only_beyond_the_middle() {

@@ -1,10 +1,10 @@
 //! Spring, motor and limits along one coordinate of a joint: an angle or a length.
 
 use super::{Form, check_limits, check_not_negative};
-use crate::engine::bodies::def::finite;
-use crate::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw, spring_coefficients};
-use crate::engine::error::Error;
-use crate::engine::lanes::Lanes;
+use crate::bodies::def::finite;
+use crate::constraints::joints::rows::{Jacobian, JointPass, RowLaw, spring_coefficients};
+use crate::error::Error;
+use crate::lanes::Lanes;
 
 /// A damped spring.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +37,7 @@ impl Spring {
         finite("rest", self.rest)
     }
 
-    /// `[S, D]`, see [`crate::engine::constraints::joints::rows`].
+    /// `[S, D]`, see [`crate::constraints::joints::rows`].
     pub(super) fn coefficients(&self, h: f32) -> [f32; 2] {
         spring_coefficients(self.hertz as f32, self.damping_ratio as f32, h)
     }

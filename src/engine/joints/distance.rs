@@ -2,10 +2,10 @@
 
 use super::axial::{Axial, Motor, Spring};
 use super::{Definition, Form, JointState, Measured, check_anchors, check_not_negative, excess};
-use crate::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw, dot};
-use crate::engine::constraints::joints::{JointType, Placing};
-use crate::engine::error::Error;
-use crate::engine::lanes::Lanes;
+use crate::constraints::joints::rows::{Jacobian, JointPass, RowLaw, dot};
+use crate::constraints::joints::{JointType, Placing};
+use crate::error::Error;
+use crate::lanes::Lanes;
 
 /// Controls the distance of two points. It is a rigid rod if there is neither spring nor motor nor limits.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,9 +1,8 @@
 //! Joints and their parameters, one file per type. `constraints/joints` solves them.
 //!
 //! ```
-//! # use simpulse_engine as simpulse;
-//! use simpulse::engine::bodies::{BodyDef, ShapeDef};
-//! use simpulse::engine::{joints::Joint, solvers, world::{Settings, World}};
+//! use simpulse_engine::bodies::{BodyDef, ShapeDef};
+//! use simpulse_engine::{joints::Joint, solvers, world::{Settings, World}};
 //!
 //! // A pendulum of 1 m, released from the side.
 //! let mut world = World::new(Settings::new(solvers::find("shim")?));
@@ -35,10 +34,10 @@ pub use revolute::Revolute;
 pub use weld::Weld;
 pub use wheel::Wheel;
 
-use crate::engine::bodies::def::{finite, finite_pair};
-use crate::engine::bodies::{Bodies, BodyHandle};
-use crate::engine::constraints::joints::JointType;
-use crate::engine::error::Error;
+use crate::bodies::def::{finite, finite_pair};
+use crate::bodies::{Bodies, BodyHandle};
+use crate::constraints::joints::JointType;
+use crate::error::Error;
 use glam::{DVec2, Vec2};
 
 /// Identifies a joint of a world; valid until the joint is removed.

@@ -2,11 +2,11 @@
 
 use super::axial::Spring;
 use super::{Definition, Form, JointState, Measured, check_anchors, check_not_negative};
-use crate::engine::bodies::def::finite;
-use crate::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
-use crate::engine::constraints::joints::{JointType, Placing};
-use crate::engine::error::Error;
-use crate::engine::lanes::Lanes;
+use crate::bodies::def::finite;
+use crate::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
+use crate::constraints::joints::{JointType, Placing};
+use crate::error::Error;
+use crate::lanes::Lanes;
 
 /// Drives b to a pose relative to a.
 #[derive(Clone, Debug, PartialEq)]

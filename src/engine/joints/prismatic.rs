@@ -2,11 +2,11 @@
 
 use super::axial::{Axial, Motor, Spring};
 use super::{Definition, Form, JointState, Measured, check_anchors, check_axis, excess, unit};
-use crate::engine::bodies::def::finite;
-use crate::engine::constraints::joints::rows::{Jacobian, JointPair, JointPass, RowLaw, add, dot};
-use crate::engine::constraints::joints::{JointType, Placing};
-use crate::engine::error::Error;
-use crate::engine::lanes::Lanes;
+use crate::bodies::def::finite;
+use crate::constraints::joints::rows::{Jacobian, JointPair, JointPass, RowLaw, add, dot};
+use crate::constraints::joints::{JointType, Placing};
+use crate::error::Error;
+use crate::lanes::Lanes;
 use glam::DVec2;
 
 /// A slider, optionally with spring, motor and limits along its axis.

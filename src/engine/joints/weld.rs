@@ -2,11 +2,11 @@
 
 use super::axial::Spring;
 use super::{Definition, Form, JointState, Measured, check_anchors};
-use crate::engine::bodies::def::finite;
-use crate::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
-use crate::engine::constraints::joints::{JointType, Placing};
-use crate::engine::error::Error;
-use crate::engine::lanes::Lanes;
+use crate::bodies::def::finite;
+use crate::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
+use crate::constraints::joints::{JointType, Placing};
+use crate::error::Error;
+use crate::lanes::Lanes;
 
 /// A weld, rigid or soft. Position and angle have separate springs.
 #[derive(Clone, Debug, Default, PartialEq)]

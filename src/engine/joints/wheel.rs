@@ -3,10 +3,10 @@
 use super::axial::{Axial, Motor, Spring};
 use super::prismatic::along_and_across;
 use super::{Definition, Form, JointState, Measured, check_anchors, check_axis, excess, unit};
-use crate::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
-use crate::engine::constraints::joints::{JointType, Placing};
-use crate::engine::error::Error;
-use crate::engine::lanes::Lanes;
+use crate::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
+use crate::constraints::joints::{JointType, Placing};
+use crate::error::Error;
+use crate::lanes::Lanes;
 use glam::DVec2;
 
 /// A wheel, optionally with a suspension along its axis and a motor.

@@ -9,8 +9,7 @@ use super::{native_width, target_features};
 /// SSE2: 4 lanes, where a recent CPU has 16. Checks the CPU once, in nanoseconds.
 ///
 /// ```
-/// # use simpulse_engine as simpulse;
-/// if let Some(line) = simpulse::engine::lanes::unused_cpu_features() {
+/// if let Some(line) = simpulse_engine::lanes::unused_cpu_features() {
 ///     eprintln!("{line}");
 /// }
 /// ```
@@ -49,7 +48,7 @@ fn widest() -> Option<(&'static str, usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::lanes::LaneWidth;
+    use crate::lanes::LaneWidth;
 
     /// `None` in a build for this CPU. In a build with fewer lanes, the message names both widths and the
     /// line to add.

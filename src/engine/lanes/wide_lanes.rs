@@ -127,7 +127,7 @@ wide_lanes!(f32x16, 16, quads: gather_16, scatter_16, scatter_halves_16,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::lanes::{IndexList, MOST_LANES, RowColumns, RowStore};
+    use crate::lanes::{IndexList, MOST_LANES, RowColumns, RowStore};
     use proptest::prelude::*;
 
     /// Awkward values, as often as ordinary ones.

@@ -7,11 +7,11 @@ use super::hull_circle::HullCircle;
 use super::hulls::Hulls;
 use super::lanes::{Class, PoseRow, Poses, ShapePair, ShapeRow, Touch};
 use super::rectangles;
-use crate::engine::contacts::{Contact, quad};
-use crate::engine::lanes::{
+use crate::contacts::{Contact, quad};
+use crate::lanes::{
     IndexList, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, align_frame, held, prefetch_records,
 };
-use crate::engine::shapes::Shape;
+use crate::shapes::Shape;
 use bytemuck::bytes_of;
 use wide::{f32x4, f32x8, f32x16};
 

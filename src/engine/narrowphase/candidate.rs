@@ -2,7 +2,7 @@
 
 use super::batch::PairKind;
 use super::lanes::PoseRow;
-use crate::engine::contacts::{Contact, pair_key};
+use crate::contacts::{Contact, pair_key};
 
 /// A pair of shapes that may touch.
 #[derive(Clone, Copy, Debug)]

@@ -17,7 +17,7 @@
 
 use super::Margins;
 use super::lanes::{Poses, ShapePair, Touch, abs, dot, rotate};
-use crate::engine::lanes::Lanes;
+use crate::lanes::Lanes;
 
 /// As fractions of the slop (1): smallest last term for which circles count as having passed, and smallest
 /// gap that they then have at the end of the step.

@@ -19,7 +19,7 @@
 
 use super::Margins;
 use super::lanes::{Touch, perp};
-use crate::engine::lanes::Lanes;
+use crate::lanes::Lanes;
 
 /// Between flush faces, b's becomes the reference only if it is better by this fraction of the slop (1).
 /// Flush faces tie in exact arithmetic. Without a preference, rounding would decide their roles, and with

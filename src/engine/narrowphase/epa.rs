@@ -11,7 +11,7 @@
 //! Source: van den Bergen, Game Developers Conference 2001.
 
 use super::gjk::Cores;
-use crate::engine::shapes::{Pose, Shape};
+use crate::shapes::{Pose, Shape};
 use glam::DVec2;
 
 /// Depth of the overlap of two cores (the shapes without their radii).

@@ -35,7 +35,7 @@
 use super::batch::{NO_CONTACT, PairKind};
 use super::candidate::Candidates;
 use super::lanes::PoseRow;
-use crate::engine::contacts::Contact;
+use crate::contacts::Contact;
 use glam::Vec2;
 
 /// Motion within which a contact stays frozen.

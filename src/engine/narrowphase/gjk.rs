@@ -9,7 +9,7 @@
 //!
 //! Source: Gilbert, Johnson, Keerthi, IEEE J. Robot. Autom. 4(2), 1988.
 
-use crate::engine::shapes::{Pose, Shape};
+use crate::shapes::{Pose, Shape};
 use glam::DVec2;
 
 /// Nearest points of two cores (the shapes without their radii). If the cores overlap, the points are

@@ -1,8 +1,8 @@
 //! Polygons, capsules and segments in the form used by the lane kernels.
 
-use crate::engine::lanes::{LaneIndex, Lanes, MOST_LANES, Quad};
-use crate::engine::params::MAX_POLYGON_VERTICES;
-use crate::engine::shapes::Shape;
+use crate::lanes::{LaneIndex, Lanes, MOST_LANES, Quad};
+use crate::params::MAX_POLYGON_VERTICES;
+use crate::shapes::Shape;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec2;
 

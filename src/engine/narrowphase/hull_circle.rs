@@ -9,7 +9,7 @@ use super::Margins;
 use super::circles::{PASSING, Rolling, arrival};
 use super::hull::{Hull, HullRow};
 use super::lanes::{Poses, ShapeRow, Touch, abs, dot, perp, rotate, unrotate, way_between};
-use crate::engine::lanes::{LaneIndex, Lanes, MOST_LANES};
+use crate::lanes::{LaneIndex, Lanes, MOST_LANES};
 
 /// Hulls (as a) and circles (as b).
 pub struct HullCircle<L> {

@@ -19,7 +19,7 @@ use super::Margins;
 use super::clip::{self, FLUSH, Faces, REFERENCE_TOLERANCE};
 use super::hull::{Hull, HullRow};
 use super::lanes::{Poses, Touch, dot, perp, rotate, unrotate};
-use crate::engine::lanes::{LaneIndex, Lanes, MOST_LANES};
+use crate::lanes::{LaneIndex, Lanes, MOST_LANES};
 
 /// Hulls a and b and the incident one of the two, along a's axes, relative to b's center of mass.
 pub struct Hulls<L> {

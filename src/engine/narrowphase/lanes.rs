@@ -1,8 +1,8 @@
 //! Lane data read and written by the narrow phase.
 
-use crate::engine::contacts::{Manifold, ManifoldPoint};
-use crate::engine::lanes::{LaneIndex, Lanes, Quad};
-use crate::engine::shapes::{Polygon, Pose, Shape};
+use crate::contacts::{Manifold, ManifoldPoint};
+use crate::lanes::{LaneIndex, Lanes, Quad};
+use crate::shapes::{Polygon, Pose, Shape};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec2;
 

@@ -35,9 +35,9 @@ pub mod lanes;
 #[doc(hidden)]
 pub mod rectangles;
 
-use crate::engine::contacts::Manifold;
-use crate::engine::params::{LINEAR_SLOP, SPECULATIVE_DISTANCE};
-use crate::engine::shapes::{Pose, Shape};
+use crate::contacts::Manifold;
+use crate::params::{LINEAR_SLOP, SPECULATIVE_DISTANCE};
+use crate::shapes::{Pose, Shape};
 use batch::PairKind;
 use hull::HullRow;
 use hull_circle::HullCircle;

@@ -18,7 +18,7 @@
 use super::Margins;
 use super::clip::{self, FLUSH, Faces, REFERENCE_TOLERANCE};
 use super::lanes::{Poses, ShapePair, Touch, abs, dot, perp, rotate};
-use crate::engine::lanes::Lanes;
+use crate::lanes::Lanes;
 
 /// Contacts of the rectangles of `pair`; points farther apart than `margins.speculative` (m) are omitted.
 #[inline(always)]

@@ -1,6 +1,6 @@
 //! Valid ranges of the values of a shape.
 
-use crate::engine::error::Error;
+use crate::error::Error;
 use glam::Vec2;
 
 /// Largest coordinate, radius or half extent (m), so that fourth powers stay finite in `f32`.

@@ -6,8 +6,8 @@ use super::check::{
 };
 use super::mass::{MassProperties, outward, rounded_hull_mass};
 use super::pose::{Aabb, Pose};
-use crate::engine::error::Error;
-use crate::engine::params::MAX_POLYGON_VERTICES;
+use crate::error::Error;
+use crate::params::MAX_POLYGON_VERTICES;
 use glam::{DVec2, Vec2};
 use std::f64::consts::PI;
 

@@ -44,17 +44,17 @@
 //! residuals tell the two cases apart: λ − z is zero in a column, and some hundred times ρ D⁻¹ Δz in a slide.
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
-use crate::engine::constraints::kernels::velocity::sweep::Sweep;
-use crate::engine::constraints::records::point_vector::{
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
+use crate::constraints::kernels::velocity::sweep::Sweep;
+use crate::constraints::records::point_vector::{
     PointEntry, Wide, difference, dot, plus_scaled, quotient, scaled, sum, sum_of_products, update,
 };
-use crate::engine::constraints::vectors::blocks::JointBlocks;
-use crate::engine::constraints::vectors::body_matrix::{BodyMatrix, velocities};
-use crate::engine::constraints::{ImpactLaw, Passes, PointVector, Solver, System, numerics::cone};
-use crate::engine::lanes::Lanes;
-use crate::engine::params::{Budget, Parameter};
+use crate::constraints::vectors::blocks::JointBlocks;
+use crate::constraints::vectors::body_matrix::{BodyMatrix, velocities};
+use crate::constraints::{ImpactLaw, Passes, PointVector, Solver, System, numerics::cone};
+use crate::lanes::Lanes;
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -31,12 +31,12 @@
 //! γ is found from the normal equations in `f64`, with at most 5 unknowns. 10⁻⁹ of the trace is added to their diagonal.
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::numerics::matrix::solve_in_place;
-use crate::engine::constraints::records::point_vector::{difference, energy, plus_scaled, update};
-use crate::engine::constraints::{Passes, Schedule};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::numerics::matrix::solve_in_place;
+use crate::constraints::records::point_vector::{difference, energy, plus_scaled, update};
+use crate::constraints::{Passes, Schedule};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

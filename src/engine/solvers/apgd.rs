@@ -30,14 +30,14 @@
 //! momentum is reset.
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::records::point_vector::{
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::records::point_vector::{
     Wide, difference, dot, plus_scaled, quotient, scaled, sum_of_products, update,
 };
-use crate::engine::constraints::vectors::spectral::ImpulseProblem;
-use crate::engine::constraints::{ImpactLaw, Passes, Solver, numerics::cone};
-use crate::engine::params::{Budget, Parameter};
+use crate::constraints::vectors::spectral::ImpulseProblem;
+use crate::constraints::{ImpactLaw, Passes, Solver, numerics::cone};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -58,13 +58,13 @@ mod joints;
 mod lanes;
 
 use super::{Law, Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::types::{Joined, Placed};
-use crate::engine::constraints::records::graph::Graph;
-use crate::engine::constraints::records::kept::KeptSize;
-use crate::engine::constraints::step::StepParts;
-use crate::engine::constraints::{Features, ImpactLaw, Passes, Solver, Workspace};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::types::{Joined, Placed};
+use crate::constraints::records::graph::Graph;
+use crate::constraints::records::kept::KeptSize;
+use crate::constraints::step::StepParts;
+use crate::constraints::{Features, ImpactLaw, Passes, Solver, Workspace};
+use crate::params::{Budget, Parameter};
 use descent::{Descent, NORMAL, PER_BODY, PER_POINT, TANGENT};
 use input::DescentInput;
 

@@ -23,14 +23,14 @@
 //!
 //! # The method
 //!
-//! See [`spectral`](crate::engine::constraints::vectors::spectral); Π gives the nearest point of the cones.
+//! See [`spectral`](crate::constraints::vectors::spectral); Π gives the nearest point of the cones.
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::vectors::spectral::{Axes, ImpulseProblem, SpectralDescent};
-use crate::engine::constraints::{ImpactLaw, Passes, Schedule, numerics::cone};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::vectors::spectral::{Axes, ImpulseProblem, SpectralDescent};
+use crate::constraints::{ImpactLaw, Passes, Schedule, numerics::cone};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -45,16 +45,16 @@
 mod law;
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::kernels::velocity::rules::NormalRule;
-use crate::engine::constraints::numerics::block_lu::BlockLu;
-use crate::engine::constraints::vectors::blocks::JointBlocks;
-use crate::engine::constraints::vectors::system::{Pair, PointRows};
-use crate::engine::constraints::{ImpactLaw, Passes, Schedule, System};
-use crate::engine::disjoint::DisjointSets;
-use crate::engine::lanes::BodyRow;
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::kernels::velocity::rules::NormalRule;
+use crate::constraints::numerics::block_lu::BlockLu;
+use crate::constraints::vectors::blocks::JointBlocks;
+use crate::constraints::vectors::system::{Pair, PointRows};
+use crate::constraints::{ImpactLaw, Passes, Schedule, System};
+use crate::disjoint::DisjointSets;
+use crate::lanes::BodyRow;
+use crate::params::{Budget, Parameter};
 use law::IslandLaw;
 
 /// See the [module](self).

@@ -34,11 +34,11 @@
 mod sweep;
 
 use super::{Law, Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Rigid;
-use crate::engine::constraints::kernels::velocity::sweep::Sweep;
-use crate::engine::constraints::{Passes, PositionSweep, Schedule};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Rigid;
+use crate::constraints::kernels::velocity::sweep::Sweep;
+use crate::constraints::{Passes, PositionSweep, Schedule};
+use crate::params::{Budget, Parameter};
 use sweep::ContactFriction;
 
 /// See the [module](self).

@@ -21,10 +21,10 @@
 //! **Fails when** loads must travel far, which takes sweeps over all contacts.
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::{Passes, Schedule, SweepOrder};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::{Passes, Schedule, SweepOrder};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -29,13 +29,13 @@
 //! the body gets the mean, Σ Δλ/m.
 
 use super::{Law, Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::masses::ScaledMasses;
-use crate::engine::constraints::kernels::velocity::rules::{Soft, angular_frequencies};
-use crate::engine::constraints::records::graph::Graph;
-use crate::engine::constraints::{ImpactLaw, Passes, Solver};
-use crate::engine::lanes::{BodyRow, held};
-use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION_OF_STEP, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::masses::ScaledMasses;
+use crate::constraints::kernels::velocity::rules::{Soft, angular_frequencies};
+use crate::constraints::records::graph::Graph;
+use crate::constraints::{ImpactLaw, Passes, Solver};
+use crate::lanes::{BodyRow, held};
+use crate::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION_OF_STEP, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

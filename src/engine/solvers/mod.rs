@@ -5,9 +5,8 @@
 //! Two solvers on the same stack:
 //!
 //! ```
-//! # use simpulse_engine as simpulse;
-//! use simpulse::engine::bodies::{BodyDef, ShapeDef};
-//! use simpulse::engine::{solvers, world::{Settings, World}};
+//! use simpulse_engine::bodies::{BodyDef, ShapeDef};
+//! use simpulse_engine::{solvers, world::{Settings, World}};
 //!
 //! let sag = |solver: &str| -> Result<f32, Box<dyn std::error::Error>> {
 //!     let mut world = World::new(Settings::new(solvers::find(solver)?));
@@ -26,14 +25,13 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use crate::engine::clock::Clock;
-use crate::engine::constraints::records::kept::KeptSize;
-use crate::engine::constraints::{ImpactLaw, Passes, Schedule, Solver, StepInput, WorkCount, Workspace};
-use crate::engine::contacts::Contact;
-use crate::engine::error::Error;
-use crate::engine::lanes::LaneWidth;
-use crate::engine::narrowphase::frozen::FreezeLimits;
-use crate::engine::params::{Budget, MAX_PARAMETERS, Mechanism, Parameter, Parameters};
+use crate::clock::Clock;
+use crate::constraints::records::kept::KeptSize;
+use crate::constraints::{ImpactLaw, Passes, Schedule, Solver, StepInput, WorkCount, Workspace};
+use crate::contacts::Contact;
+use crate::error::Error;
+use crate::lanes::LaneWidth;
+use crate::params::{Budget, MAX_PARAMETERS, Mechanism, Parameter, Parameters};
 
 pub mod admm;
 pub mod anderson;
@@ -147,12 +145,11 @@ pub enum Law {
 /// A solver defined outside the crate needs no row in the table to run:
 ///
 /// ```
-/// # use simpulse_engine as simpulse;
-/// use simpulse::engine::clock::Phase;
-/// use simpulse::engine::constraints::kernels::velocity::rules::Baumgarte;
-/// use simpulse::engine::constraints::{Passes, Schedule};
-/// use simpulse::engine::solvers::Variant;
-/// use simpulse::engine::world::{Settings, World};
+/// use simpulse_engine::clock::Phase;
+/// use simpulse_engine::constraints::kernels::velocity::rules::Baumgarte;
+/// use simpulse_engine::constraints::{Passes, Schedule};
+/// use simpulse_engine::solvers::Variant;
+/// use simpulse_engine::world::{Settings, World};
 ///
 /// static MINE: Variant = Variant { name: "mine", make: || Schedule::boxed(step), ..Variant::BASE };
 ///
@@ -170,7 +167,7 @@ pub enum Law {
 ///
 /// let mut world = World::new(Settings::new(&MINE));
 /// world.step()?;
-/// # Ok::<(), simpulse::engine::world::Divergence>(())
+/// # Ok::<(), simpulse_engine::world::Divergence>(())
 /// ```
 #[derive(Debug)]
 pub struct Variant {
@@ -196,9 +193,7 @@ pub struct Variant {
     pub softness: Option<fn(&Parameters, f32) -> [f32; 2]>,
     /// Impact law of its source.
     pub impacts: ImpactLaw,
-    /// Limits within which its source [freezes](crate::engine::narrowphase::frozen) contacts; `None` if it does not.
-    pub frozen: Option<FreezeLimits>,
-    /// Default of [continuous collision](crate::engine::continuous).
+    /// Default of [continuous collision](crate::continuous).
     pub continuous: bool,
     /// Numbers kept from step to step, in addition to impulses.
     pub kept: KeptSize,
@@ -281,7 +276,7 @@ impl Variant {
         Ok(())
     }
 
-    /// Index of the mechanism called `name`, for [`crate::engine::params::Without`]; hyphens count as
+    /// Index of the mechanism called `name`, for [`crate::params::Without`]; hyphens count as
     /// underscores. Errors: no such mechanism.
     pub fn mechanism(&self, name: &str) -> Result<usize, Error> {
         let plain = name.replace('-', "_");

@@ -29,11 +29,11 @@
 //! v changes by M⁻¹Jᵀ β p. The next sweep brings λ back within its bounds.
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::vectors::conjugate::Conjugate;
-use crate::engine::constraints::{Passes, Schedule};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::vectors::conjugate::Conjugate;
+use crate::constraints::{Passes, Schedule};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -40,21 +40,21 @@
 //! |y| (the case of Painlevé's rod). If r ≤ 0 the point does not touch, and both impulses are zero.
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::frame::{
+use crate::clock::Phase;
+use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, TURN, arms, separation, spin, to_frame, turn, with_arms,
 };
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
-use crate::engine::constraints::kernels::velocity::rules::{Baumgarte, NormalRule, Softness};
-use crate::engine::constraints::kernels::velocity::sweep::Sweep;
-use crate::engine::constraints::records::batches::{Batches, Segment};
-use crate::engine::constraints::records::features::{
+use crate::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
+use crate::constraints::kernels::velocity::rules::{Baumgarte, NormalRule, Softness};
+use crate::constraints::kernels::velocity::sweep::Sweep;
+use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::constraints::{Passes, Schedule};
-use crate::engine::lanes::{BodyRow, Lanes};
-use crate::engine::params::Parameter;
+use crate::constraints::{Passes, Schedule};
+use crate::lanes::{BodyRow, Lanes};
+use crate::params::Parameter;
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -19,10 +19,10 @@
 //! convergence over a stack is that of [`super::pgs`].
 
 use super::{Law, Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Soft;
-use crate::engine::constraints::{Passes, PositionSweep, Schedule};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Soft;
+use crate::constraints::{Passes, PositionSweep, Schedule};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

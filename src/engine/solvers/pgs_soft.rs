@@ -18,10 +18,10 @@
 //! step rate, a spring is only as stiff as 20 Hz.
 
 use super::{Law, Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
-use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
-use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION_OF_STEP, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
+use crate::constraints::{ImpactLaw, Passes, Schedule};
+use crate::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION_OF_STEP, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

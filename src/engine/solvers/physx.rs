@@ -36,14 +36,14 @@
 //! anchor.
 
 use super::{Law, Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Soft;
-use crate::engine::constraints::kernels::velocity::sticky::{Patch, Sticky};
-use crate::engine::constraints::kernels::velocity::sweep::Sweep;
-use crate::engine::constraints::records::kept::KeptSize;
-use crate::engine::constraints::step::Drifts;
-use crate::engine::constraints::{Passes, Solver};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Soft;
+use crate::constraints::kernels::velocity::sticky::{Patch, Sticky};
+use crate::constraints::kernels::velocity::sweep::Sweep;
+use crate::constraints::records::kept::KeptSize;
+use crate::constraints::step::Drifts;
+use crate::constraints::{Passes, Solver};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -18,10 +18,10 @@
 //! step starts from zero impulses, so tall stacks sink and spread.
 
 use super::{Law, Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Touching;
-use crate::engine::constraints::{ImpactLaw, Passes, PositionSweep, Schedule};
-use crate::engine::params::Budget;
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Touching;
+use crate::constraints::{ImpactLaw, Passes, PositionSweep, Schedule};
+use crate::params::Budget;
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -8,7 +8,7 @@
 //! **Departures.** The contact frequency is clamped to an eighth of the substep rate, which rapier leaves to
 //! its user; at its standard 4 substeps both have 30 Hz. Pairs with a determinant below a thousandth of the
 //! product of their diagonal are solved row by row; rapier's threshold is a hundredth. Restitution is this
-//! crate's. Contacts of discs are not [frozen](crate::engine::narrowphase::frozen). Contacts are solved in the order of this crate's colors.
+//! crate's. Contacts of discs are not [frozen](crate::narrowphase::frozen). Contacts are solved in the order of this crate's colors.
 //!
 //! **Agreement.** The source at its best: 4 substeps of 1 and 1 sweep, 30 Hz, ζ 10, 3 m/s. Here: 4 substeps of 1
 //! iteration, 1 relaxing sweep, contact_hertz 30, push_speed 3. Apart from the source's method in `f64` over 10
@@ -22,11 +22,10 @@
 //! **Fails when** [`super::soft_step`] does: the block couples the two points of a contact, not two contacts.
 
 use super::{Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::{Frictionless, Soft, angular_frequencies};
-use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
-use crate::engine::narrowphase::frozen::FreezeLimits;
-use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::{Frictionless, Soft, angular_frequencies};
+use crate::constraints::{ImpactLaw, Passes, Schedule};
+use crate::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -35,10 +35,10 @@
 pub mod convex;
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::{ImpactLaw, Passes, Schedule};
+use crate::params::{Budget, Parameter};
 use convex::Convex;
 
 /// See the [module](self).

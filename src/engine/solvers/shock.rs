@@ -24,14 +24,14 @@
 //! swinging bodies are damped.
 
 use super::{Law, Variant};
-use crate::engine::bodies::Bodies;
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::masses::ScaledMasses;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::records::graph::Graph;
-use crate::engine::constraints::{Passes, Solver, SweepOrder};
-use crate::engine::contacts::Contact;
-use crate::engine::params::{Budget, Parameter};
+use crate::bodies::Bodies;
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::masses::ScaledMasses;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::records::graph::Graph;
+use crate::constraints::{Passes, Solver, SweepOrder};
+use crate::contacts::Contact;
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -6,7 +6,7 @@
 //! `macklin2019` (substeps instead of iterations).
 //!
 //! **Departures.** From the second substep on, the warm start is a pass over bodies instead of constraints
-//! (see [`crate::engine::constraints::kernels::motion::Motion::extrapolate_velocities`]); in exact arithmetic
+//! (see [`crate::constraints::kernels::motion::Motion::extrapolate_velocities`]); in exact arithmetic
 //! the result is the same. Contacts with static and kinematic bodies are twice as stiff, as in the source.
 //!
 //! **Agreement.** The source at its best: 4 substeps of 1 and 1 sweep, 30 Hz, ζ 10, 2 m/s. Here: 4 substeps of 1
@@ -23,10 +23,10 @@
 //! frequency, and the sag falls with the square of the frequency.
 
 use super::{Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
-use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
-use crate::engine::params::{Budget, CONTACT_HERTZ_FRACTION, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
+use crate::constraints::{ImpactLaw, Passes, Schedule};
+use crate::params::{Budget, CONTACT_HERTZ_FRACTION, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -20,11 +20,11 @@
 //! of the velocity sweeps stays in the velocities, and pseudo-velocities start at zero in each step.
 
 use super::{Law, Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::{Rigid, Soft};
-use crate::engine::constraints::{Passes, Solver};
-use crate::engine::lanes::{BodyRow, held};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::{Rigid, Soft};
+use crate::constraints::{Passes, Solver};
+use crate::lanes::{BodyRow, held};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -28,17 +28,17 @@
 //!
 //! At a fixed point, λn is complementary to un, and λt dissipates the most energy.
 //!
-//! [`spectral`]: crate::engine::constraints::vectors::spectral
+//! [`spectral`]: crate::constraints::vectors::spectral
 
 use super::{Law, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::kernels::velocity::sweep::Sweep;
-use crate::engine::constraints::records::point_vector::{PointEntry, Wide};
-use crate::engine::constraints::vectors::spectral::{Axes, ImpulseProblem, SpectralDescent};
-use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
-use crate::engine::lanes::Lanes;
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::kernels::velocity::sweep::Sweep;
+use crate::constraints::records::point_vector::{PointEntry, Wide};
+use crate::constraints::vectors::spectral::{Axes, ImpulseProblem, SpectralDescent};
+use crate::constraints::{ImpactLaw, Passes, Schedule};
+use crate::lanes::Lanes;
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

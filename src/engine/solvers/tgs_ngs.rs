@@ -19,10 +19,10 @@
 //! a sweep stays in the velocities and stacks jitter.
 
 use super::{Law, Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Rigid;
-use crate::engine::constraints::{ImpactLaw, Passes, PositionSweep, Schedule};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Rigid;
+use crate::constraints::{ImpactLaw, Passes, PositionSweep, Schedule};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -20,10 +20,10 @@
 //! degrees within a step; the cost is always paid.
 
 use super::{Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::{Soft, angular_frequencies};
-use crate::engine::constraints::{ImpactLaw, Passes, Schedule};
-use crate::engine::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::{Soft, angular_frequencies};
+use crate::constraints::{ImpactLaw, Passes, Schedule};
+use crate::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

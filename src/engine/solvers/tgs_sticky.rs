@@ -23,12 +23,12 @@
 //! of an overlap is pushed out through velocities.
 
 use super::{Law, Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::sticky::Sticky;
-use crate::engine::constraints::records::kept::KeptSize;
-use crate::engine::constraints::step::Drifts;
-use crate::engine::constraints::{ImpactLaw, Passes, Solver};
-use crate::engine::params::{Budget, LINEAR_SLOP, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::sticky::Sticky;
+use crate::constraints::records::kept::KeptSize;
+use crate::constraints::step::Drifts;
+use crate::constraints::{ImpactLaw, Passes, Solver};
+use crate::params::{Budget, LINEAR_SLOP, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

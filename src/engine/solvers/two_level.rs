@@ -21,14 +21,14 @@
 //! shares it. Contacts that switch between sticking and sliding are left to the sweeps as well.
 
 use super::Variant;
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::rules::Baumgarte;
-use crate::engine::constraints::kernels::velocity::sweep::Sweep;
-use crate::engine::constraints::records::graph::Graph;
-use crate::engine::constraints::vectors::conjugate::Conjugate;
-use crate::engine::constraints::vectors::levels::Levels;
-use crate::engine::constraints::{Passes, Solver};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::rules::Baumgarte;
+use crate::constraints::kernels::velocity::sweep::Sweep;
+use crate::constraints::records::graph::Graph;
+use crate::constraints::vectors::conjugate::Conjugate;
+use crate::constraints::vectors::levels::Levels;
+use crate::constraints::{Passes, Solver};
+use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

@@ -25,10 +25,10 @@
 mod displace;
 
 use super::{Law, Uses, Variant};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::{ImpactLaw, Passes, PointVector, Solver, Workspace};
-use crate::engine::lanes::{BodyRow, held};
-use crate::engine::params::{Budget, Parameter};
+use crate::clock::Phase;
+use crate::constraints::{ImpactLaw, Passes, PointVector, Solver, Workspace};
+use crate::lanes::{BodyRow, held};
+use crate::params::{Budget, Parameter};
 use displace::{AfterDisplacing, Approach, Displace};
 
 /// See the [module](self).

@@ -1,10 +1,10 @@
 //! Candidates: pairs of shapes whose bounds overlap, kept while they do.
 
 use super::World;
-use crate::engine::contacts::pair_key;
-use crate::engine::narrowphase::batch::{NO_CONTACT, PairKind};
-use crate::engine::narrowphase::candidate::Candidate;
-use crate::engine::params::SPECULATIVE_DISTANCE;
+use crate::contacts::pair_key;
+use crate::narrowphase::batch::{NO_CONTACT, PairKind};
+use crate::narrowphase::candidate::Candidate;
+use crate::params::SPECULATIVE_DISTANCE;
 
 /// Allowance for rounding in a squared distance (1).
 const REACH_ROUNDING: f32 = 1.0 + 1e-5;

@@ -1,17 +1,15 @@
 //! Updates contacts from candidates and carries their impulses from step to step.
 
 use super::World;
-use crate::engine::bodies::BodyKind;
-use crate::engine::constraints::Solver;
-use crate::engine::constraints::step::{Collision, CollisionScene};
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{Quad, held};
-use crate::engine::narrowphase::Margins;
-use crate::engine::narrowphase::batch::{self, Input, Jobs, NO_CONTACT, PairKind, Shapes};
-use crate::engine::narrowphase::candidate::{Candidate, Candidates};
-use crate::engine::narrowphase::circles::Rolling;
-use crate::engine::narrowphase::frozen::FrozenContacts;
-use crate::engine::narrowphase::lanes::PoseRow;
+use crate::constraints::Solver;
+use crate::constraints::step::{Collision, CollisionScene};
+use crate::contacts::Contact;
+use crate::lanes::{Quad, held};
+use crate::narrowphase::Margins;
+use crate::narrowphase::batch::{self, Input, Jobs, NO_CONTACT, PairKind, Shapes};
+use crate::narrowphase::candidate::{Candidate, Candidates};
+use crate::narrowphase::circles::Rolling;
+use crate::narrowphase::lanes::PoseRow;
 use glam::Vec2;
 
 /// State of the narrow phase between steps.

@@ -1,6 +1,6 @@
 //! Counts of a step, and divergence.
 
-use crate::engine::params::DIVERGED_SPEED;
+use crate::params::DIVERGED_SPEED;
 
 /// Counts of the last step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,14 +66,13 @@ pub enum Criterion {
 /// The body and the step at which a simulation diverged.
 ///
 /// ```
-/// # use simpulse_engine as simpulse;
-/// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+/// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
 /// let mut world = World::new(Settings::new(solvers::find("pgs")?));
 /// let fast = BodyDef::dynamic([0.0, 0.0]).with_velocity([2e5, 0.0]);
 /// world.add_body(&fast.with(ShapeDef::circle(0.5)?))?;
 /// let divergence = world.step().unwrap_err();
 /// assert!(divergence.to_string().starts_with("diverged at step 1: body 0 moves at 2.000e5 m/s"));
-/// # Ok::<(), simpulse::engine::error::Error>(())
+/// # Ok::<(), simpulse_engine::error::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Divergence {

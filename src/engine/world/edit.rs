@@ -1,12 +1,12 @@
 //! Adding, removing and moving bodies.
 
 use super::{Surface, World};
-use crate::engine::bodies::def::{finite, finite_pair};
-use crate::engine::bodies::{BodyDef, BodyHandle, BodyKind};
-use crate::engine::broadphase::Proxy;
-use crate::engine::constraints::kernels::types::ConstraintType;
-use crate::engine::error::Error;
-use crate::engine::shapes::{Aabb, MassProperties, Shape};
+use crate::bodies::def::{finite, finite_pair};
+use crate::bodies::{BodyDef, BodyHandle, BodyKind};
+use crate::broadphase::Proxy;
+use crate::constraints::kernels::types::ConstraintType;
+use crate::error::Error;
+use crate::shapes::{Aabb, MassProperties, Shape};
 use glam::Vec2;
 
 /// Body slots: which indices are in use.
@@ -46,8 +46,7 @@ impl World {
     /// shapes, if there is one. Errors: as [`BodyDef::check`].
     ///
     /// ```
-    /// # use simpulse_engine as simpulse;
-    /// use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
     ///
     /// let mut world = World::new(Settings::new(solvers::find("shim")?));
     /// let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
@@ -55,7 +54,7 @@ impl World {
     /// let heavy = ShapeDef::circle(0.5)?.with_density(-1.0);
     /// let error = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(heavy)).unwrap_err();
     /// assert_eq!(error.to_string(), "shapes[0].density: must be positive, is -1.0");
-    /// # Ok::<(), simpulse::engine::error::Error>(())
+    /// # Ok::<(), simpulse_engine::error::Error>(())
     /// ```
     pub fn add_body(&mut self, body: &BodyDef) -> Result<BodyHandle, Error> {
         let mass = body.check()?;
@@ -135,15 +134,14 @@ impl World {
     /// [`World::add_constraints`] is attached to it.
     ///
     /// ```
-    /// # use simpulse_engine as simpulse;
-    /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
     /// let mut world = World::new(Settings::new(solvers::find("shim")?));
     /// let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
     /// world.remove_body(ball)?;
     /// assert!(!world.contains(ball));
     /// let error = world.set_velocity(ball, [1.0, 0.0], 0.0).unwrap_err();
     /// assert_eq!(error.to_string(), "body 0 was removed");
-    /// # Ok::<(), simpulse::engine::error::Error>(())
+    /// # Ok::<(), simpulse_engine::error::Error>(())
     /// ```
     pub fn remove_body(&mut self, body: BodyHandle) -> Result<(), Error> {
         let i = self.index_of(body)?;
@@ -207,14 +205,13 @@ impl World {
     /// Errors: the body was removed; a value that is not finite.
     ///
     /// ```
-    /// # use simpulse_engine as simpulse;
-    /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
     /// # let mut world = World::new(Settings::new(solvers::find("shim")?));
     /// # let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
     /// world.set_pose(ball, [3.0, 1.0], 0.3)?;
     /// world.set_velocity(ball, [0.0, 5.0], -1.0)?;
     /// assert_eq!(world.bodies.origin(ball.index()), [3.0, 1.0]);
-    /// # Ok::<(), simpulse::engine::error::Error>(())
+    /// # Ok::<(), simpulse_engine::error::Error>(())
     /// ```
     pub fn set_pose(&mut self, body: BodyHandle, position: [f64; 2], angle: f64) -> Result<(), Error> {
         let i = self.index_of(body)?;
@@ -243,14 +240,13 @@ impl World {
     }
 
     /// Applies a force (N) at the center of mass during the next step only, in addition to the persistent
-    /// [`Bodies::force_x`](crate::engine::bodies::Bodies::force_x), which lasts until it is changed. It moves
+    /// [`Bodies::force_x`](crate::bodies::Bodies::force_x), which lasts until it is changed. It moves
     /// only dynamic bodies.
     ///
     /// Errors: the body was removed; a value that is not finite.
     ///
     /// ```
-    /// # use simpulse_engine as simpulse;
-    /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
     /// # let mut world = World::new(Settings::new(solvers::find("shim")?));
     /// # let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
     /// world.apply_force(ball, [500.0, 0.0])?;
@@ -274,8 +270,7 @@ impl World {
     /// Errors: the body was removed; a value that is not finite.
     ///
     /// ```
-    /// # use simpulse_engine as simpulse;
-    /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
     /// # let mut world = World::new(Settings::new(solvers::find("shim")?));
     /// let plate = ShapeDef::rectangle(1.0, 0.125)?.with_density(2.0);
     /// let plate = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(plate))?;
@@ -283,7 +278,7 @@ impl World {
     /// world.apply_impulse(plate, [0.0, 2.0], [1.0, 2.0])?;
     /// assert_eq!(world.bodies.velocity_y[plate.index()], 2.0);
     /// assert!(world.bodies.angular_velocity[plate.index()] > 5.0);
-    /// # Ok::<(), simpulse::engine::error::Error>(())
+    /// # Ok::<(), simpulse_engine::error::Error>(())
     /// ```
     pub fn apply_impulse(
         &mut self,

@@ -1,16 +1,16 @@
 //! Contact events (begin, end, hit), and contacts in world coordinates.
 
 use super::World;
-use crate::engine::bodies::BodyHandle;
-use crate::engine::contacts::Contact;
-use crate::engine::error::Error;
-use crate::engine::params::HIT_SPEED;
+use crate::bodies::BodyHandle;
+use crate::contacts::Contact;
+use crate::error::Error;
+use crate::params::HIT_SPEED;
 use glam::{DVec2, Vec2};
 
 /// A contact event in the last step. Bodies and shapes are in the order of the [`Contact`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ContactEvent {
-    /// Two shapes came within [`SPECULATIVE_DISTANCE`](crate::engine::params::SPECULATIVE_DISTANCE), at which
+    /// Two shapes came within [`SPECULATIVE_DISTANCE`](crate::params::SPECULATIVE_DISTANCE), at which
     /// contacts begin.
     Begin {
         /// The bodies.
@@ -87,9 +87,8 @@ impl World {
     /// [`Settings::contact_events`](super::Settings::contact_events) is set.
     ///
     /// ```
-    /// # use simpulse_engine as simpulse;
-    /// use simpulse::engine::bodies::{BodyDef, ShapeDef};
-    /// use simpulse::engine::{solvers, world::{ContactEvent, Settings, World}};
+    /// use simpulse_engine::bodies::{BodyDef, ShapeDef};
+    /// use simpulse_engine::{solvers, world::{ContactEvent, Settings, World}};
     ///
     /// let settings = Settings { contact_events: true, ..Settings::new(solvers::find("shim")?) };
     /// let mut world = World::new(settings);
@@ -116,8 +115,7 @@ impl World {
     /// removed.
     ///
     /// ```
-    /// # use simpulse_engine as simpulse;
-    /// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
     /// # let mut world = World::new(Settings::new(solvers::find("shim")?));
     /// # world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(10.0, 1.0)?))?;
     /// let crate_ = world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
@@ -157,7 +155,7 @@ impl World {
             let [i, j] = [contact.body_a as usize, contact.body_b as usize];
             let points = contact.manifold.points();
             let at = |i: usize, arm: Vec2| b.velocity(i) + b.angular_velocity[i] * arm.perp();
-            let speed = |p: &crate::engine::contacts::ManifoldPoint| {
+            let speed = |p: &crate::contacts::ManifoldPoint| {
                 (at(i, p.anchor_a) - at(j, p.anchor_b)).dot(contact.manifold.normal)
             };
             let arm = points.iter().map(|p| p.anchor_b).sum::<Vec2>() / points.len().max(1) as f32;

@@ -18,15 +18,15 @@
 //!   that they remain those of a simulation.
 
 use super::World;
-use crate::engine::bodies::Bodies;
-use crate::engine::broadphase::{FatBoxes, Proxy};
-use crate::engine::clock::{Clock, Phase, PhaseFilter, Timings};
-use crate::engine::constraints::kernels::types::ConstraintType;
-use crate::engine::constraints::records::kept::Kept;
-use crate::engine::constraints::{Batches, Features, OppositeKind, Solver, WorkCount, Workspace};
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{Block, BodyRow, Counted, LaneWidth, Operations};
-use crate::engine::world::{Order, StepCounts};
+use crate::bodies::Bodies;
+use crate::broadphase::{FatBoxes, Proxy};
+use crate::clock::{Clock, Phase, PhaseFilter, Timings};
+use crate::constraints::kernels::types::ConstraintType;
+use crate::constraints::records::kept::Kept;
+use crate::constraints::{Batches, Features, OppositeKind, Solver, WorkCount, Workspace};
+use crate::contacts::Contact;
+use crate::lanes::{Block, BodyRow, Counted, LaneWidth, Operations};
+use crate::world::{Order, StepCounts};
 
 /// A frozen world. Dropping it resumes the world as if nothing had happened.
 pub struct HeldWorld<'w> {

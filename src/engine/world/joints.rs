@@ -1,14 +1,14 @@
 //! Adding, changing, removing and reading joints.
 
 use super::World;
-use crate::engine::bodies::{Bodies, BodyHandle};
-use crate::engine::constraints::joints::Joints;
-use crate::engine::constraints::kernels::types::{Booked, ConstraintType, Joined, Placed};
-use crate::engine::constraints::records::rows::{ROWS, RowBlock};
-use crate::engine::error::Error;
-use crate::engine::joints::{Definition, Form, Joint, JointHandle, JointKind, JointState, measured, of_kind};
-use crate::engine::lanes::BodyRow;
-use crate::engine::narrowphase::lanes::PoseRow;
+use crate::bodies::{Bodies, BodyHandle};
+use crate::constraints::joints::Joints;
+use crate::constraints::kernels::types::{Booked, ConstraintType, Joined, Placed};
+use crate::constraints::records::rows::{ROWS, RowBlock};
+use crate::error::Error;
+use crate::joints::{Definition, Form, Joint, JointHandle, JointKind, JointState, measured, of_kind};
+use crate::lanes::BodyRow;
+use crate::narrowphase::lanes::PoseRow;
 use std::any::Any;
 use std::collections::BTreeSet;
 

@@ -1,9 +1,9 @@
 //! Assignment of contacts to lanes.
 
 use super::{Order, World};
-use crate::engine::bodies::BodyKind;
-use crate::engine::constraints::step::assign::Sides;
-use crate::engine::constraints::{Features, OppositeKind};
+use crate::bodies::BodyKind;
+use crate::constraints::step::assign::Sides;
+use crate::constraints::{Features, OppositeKind};
 
 impl World {
     /// Assigns every contact to a lane. The last step's lanes are reused while the set of contacts is the

@@ -1,7 +1,7 @@
 //! Memory that a world allocates, and the part of it in use.
 
 use super::World;
-use crate::engine::lanes::held;
+use crate::lanes::held;
 use std::mem::size_of_val;
 
 /// Memory of the arrays with one purpose.

@@ -4,21 +4,21 @@
 //! bounds → pairs → manifolds → colors → records → solver stages → impulses, poses
 //! ```
 
-use crate::engine::bodies::Bodies;
-use crate::engine::broadphase::{BroadPhase, FatBoxes, Proxy, Region};
-use crate::engine::clock::{Clock, Phase, PhaseFilter, Timings};
-use crate::engine::constraints::kernels::motion::{self, MotionInput};
-use crate::engine::constraints::kernels::observe::ObservedRule;
-use crate::engine::constraints::step::assign::Assignment;
-use crate::engine::constraints::{Features, ImpactLaw, Solver, StepInput, WorkCount, Workspace};
-use crate::engine::contacts::Contact;
-use crate::engine::continuous::{Continuous, Moving};
-use crate::engine::lanes::LaneWidth;
-use crate::engine::narrowphase::Margins;
-use crate::engine::narrowphase::lanes::{Class, PoseRow};
-use crate::engine::params::DIVERGED_SPEED;
-use crate::engine::shapes::Shape;
-use crate::engine::solvers::{self, Variant};
+use crate::bodies::Bodies;
+use crate::broadphase::{BroadPhase, FatBoxes, Proxy, Region};
+use crate::clock::{Clock, Phase, PhaseFilter, Timings};
+use crate::constraints::kernels::motion::{self, MotionInput};
+use crate::constraints::kernels::observe::ObservedRule;
+use crate::constraints::step::assign::Assignment;
+use crate::constraints::{Features, ImpactLaw, Solver, StepInput, WorkCount, Workspace};
+use crate::contacts::Contact;
+use crate::continuous::{Continuous, Moving};
+use crate::lanes::LaneWidth;
+use crate::narrowphase::Margins;
+use crate::narrowphase::lanes::{Class, PoseRow};
+use crate::params::DIVERGED_SPEED;
+use crate::shapes::Shape;
+use crate::solvers::{self, Variant};
 use collide::Narrow;
 use edit::{Slots, StandingForces};
 use events::Events;
@@ -70,8 +70,7 @@ struct Surface {
 /// A clone continues bit-identically. A `watch` on iterations is not cloned.
 ///
 /// ```
-/// # use simpulse_engine as simpulse;
-/// # use simpulse::engine::{bodies::{BodyDef, ShapeDef}, lanes::LaneWidth, solvers, world::{Settings, World}};
+/// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, lanes::LaneWidth, solvers, world::{Settings, World}};
 /// // A stack, at one lane and at the widest: the same bits.
 /// let mut hashes = Vec::new();
 /// for width in [LaneWidth::W1, LaneWidth::W16] {

@@ -9,12 +9,12 @@
 //! Source: `vandenbergen2004`.
 
 use super::World;
-use crate::engine::bodies::BodyHandle;
-use crate::engine::bodies::def::finite_pair;
-use crate::engine::broadphase::Region;
-use crate::engine::error::Error;
-use crate::engine::narrowphase::gjk::distance;
-use crate::engine::shapes::{Aabb, Pose, Shape};
+use crate::bodies::BodyHandle;
+use crate::bodies::def::finite_pair;
+use crate::broadphase::Region;
+use crate::error::Error;
+use crate::narrowphase::gjk::distance;
+use crate::shapes::{Aabb, Pose, Shape};
 use glam::{DVec2, Vec2};
 
 /// The first point where a ray meets a shape. Distances have a relative accuracy of 10⁻⁷.
@@ -52,9 +52,8 @@ impl World {
     /// Prepares queries on the current positions. They do not change the bits of later steps.
     ///
     /// ```
-    /// # use simpulse_engine as simpulse;
-    /// use simpulse::engine::bodies::{BodyDef, ShapeDef};
-    /// use simpulse::engine::{solvers, world::{Settings, World}};
+    /// use simpulse_engine::bodies::{BodyDef, ShapeDef};
+    /// use simpulse_engine::{solvers, world::{Settings, World}};
     ///
     /// let mut world = World::new(Settings::new(solvers::find("shim")?));
     /// let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;

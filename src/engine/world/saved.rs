@@ -9,17 +9,16 @@ use super::events::Events;
 use super::joints::SavedJoints;
 use super::traits::Traits;
 use super::{Order, Settings, World};
-use crate::engine::bodies::{BodyDef, BodyKind};
-use crate::engine::broadphase::BroadPhaseKind;
-use crate::engine::constraints::kernels::motion::{Integrator, RotationUpdate};
-use crate::engine::constraints::records::kept::Kept;
-use crate::engine::constraints::{Features, Impacts};
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::LaneWidth;
-use crate::engine::narrowphase::frozen::Freezing;
-use crate::engine::params::{Budget, Parameters, Without};
-use crate::engine::shapes::{MassProperties, Shape};
-use crate::engine::solvers;
+use crate::bodies::{BodyDef, BodyKind};
+use crate::broadphase::BroadPhaseKind;
+use crate::constraints::kernels::motion::{Integrator, RotationUpdate};
+use crate::constraints::records::kept::Kept;
+use crate::constraints::{Features, Impacts};
+use crate::contacts::Contact;
+use crate::lanes::LaneWidth;
+use crate::params::{Budget, Parameters, Without};
+use crate::shapes::{MassProperties, Shape};
+use crate::solvers;
 use glam::Vec2;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -138,7 +137,7 @@ struct SavedWorld {
     bullet: Vec<bool>,
     round: Vec<bool>,
     local_center: Vec<Vec2>,
-    /// The arrays of floats, in the order of [`Bodies::arrays`](crate::engine::bodies::Bodies::arrays).
+    /// The arrays of floats, in the order of [`Bodies::arrays`](crate::bodies::Bodies::arrays).
     floats: Vec<Vec<f32>>,
     shapes: Vec<Shape>,
     /// Friction and restitution of each shape.

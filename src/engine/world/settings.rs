@@ -1,12 +1,11 @@
 //! Settings of a world.
 
-use crate::engine::broadphase::BroadPhaseKind;
-use crate::engine::constraints::kernels::motion::{Integrator, RotationUpdate};
-use crate::engine::constraints::{Features, ImpactLaw, Impacts};
-use crate::engine::lanes::{LaneWidth, native_width};
-use crate::engine::narrowphase::frozen::{FreezeLimits, Freezing};
-use crate::engine::params::{Budget, Parameters, Without};
-use crate::engine::solvers::Variant;
+use crate::broadphase::BroadPhaseKind;
+use crate::constraints::kernels::motion::{Integrator, RotationUpdate};
+use crate::constraints::{Features, ImpactLaw, Impacts};
+use crate::lanes::{LaneWidth, native_width};
+use crate::params::{Budget, Parameters, Without};
+use crate::solvers::Variant;
 
 /// The order in which constraints are solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -47,8 +46,7 @@ impl Order {
 /// Settings of a world: solver, budget, lanes, step, gravity and options.
 ///
 /// ```
-/// # use simpulse_engine as simpulse;
-/// use simpulse::engine::{params::Budget, solvers, world::Settings};
+/// use simpulse_engine::{params::Budget, solvers, world::Settings};
 ///
 /// let mut settings = Settings {
 ///     gravity: [0.0, -1.6],
@@ -58,11 +56,11 @@ impl Order {
 /// // A parameter of the solver's own, by name; its range is checked.
 /// settings.solver.set(&mut settings.parameters, "contact_hertz", 60.0)?;
 /// assert!(settings.solver.set(&mut settings.parameters, "contact_hertz", -1.0).is_err());
-/// # Ok::<(), simpulse::engine::error::Error>(())
+/// # Ok::<(), simpulse_engine::error::Error>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// The solver: a row of [`crate::engine::solvers::VARIANTS`].
+    /// The solver: a row of [`crate::solvers::VARIANTS`].
     pub solver: &'static Variant,
     /// Maximum number of lanes per instruction.
     pub width: LaneWidth,
@@ -78,7 +76,7 @@ pub struct Settings {
     /// Time step (s).
     pub dt: f32,
     /// Size of typical bodies (m). The engine's own lengths and speeds, such as the slop and the push speed
-    /// ([`crate::engine::params`]), are chosen for bodies of about a meter. They are multiplied by this, and
+    /// ([`crate::params`]), are chosen for bodies of about a meter. They are multiplied by this, and
     /// so are `parameters` in m and m/s. A scene therefore moves in the same way at any scale.
     pub length_unit: f32,
     /// Values of the solver's own parameters, see [`Variant::set`].
@@ -88,13 +86,11 @@ pub struct Settings {
     /// How impacts are solved: by the solver's own law, by waves of impacts before the step, or without
     /// bounce.
     pub impacts: Impacts,
-    /// Whether contacts keep their normal and lever arms while bodies hardly move.
-    pub frozen: Freezing,
-    /// Sum impulses over the substeps into [`crate::engine::contacts::Contact::step_impulse`].
+    /// Sum impulses over the substeps into [`crate::contacts::Contact::step_impulse`].
     pub record_impulses: bool,
-    /// Find [`World::contact_events`](crate::engine::world::World::contact_events) after each step.
+    /// Find [`World::contact_events`](crate::world::World::contact_events) after each step.
     pub contact_events: bool,
-    /// Keep the rule of each step's last velocity sweep, see [`crate::engine::world::World::observed_rule`].
+    /// Keep the rule of each step's last velocity sweep, see [`crate::world::World::observed_rule`].
     pub observe_rule: bool,
     /// Read the clock around every phase.
     pub timed: bool,
@@ -105,7 +101,7 @@ pub struct Settings {
     /// How angular velocities rotate bodies.
     pub rotation: RotationUpdate,
     /// Continuous collision: stop fast bodies at surfaces that they would otherwise pass through, see
-    /// [`crate::engine::continuous`].
+    /// [`crate::continuous`].
     pub continuous: bool,
     /// Extra kernel features to compile in, to measure their cost.
     pub extra_features: Features,

@@ -1,8 +1,8 @@
 //! Features of a world's bodies, collected as they are added.
 
-use crate::engine::bodies::{BodyDef, BodyKind};
-use crate::engine::constraints::Features;
-use crate::engine::shapes::Shape;
+use crate::bodies::{BodyDef, BodyKind};
+use crate::constraints::Features;
+use crate::shapes::Shape;
 
 /// Number of bodies that have a property, and whether one of them is dynamic.
 #[derive(Clone, Copy, Debug, Default)]
@@ -40,7 +40,7 @@ impl Traits {
     /// Records a body; `round` if it consists of discs about its center of mass.
     pub fn add(&mut self, body: &BodyDef, round: bool) {
         let dynamic = body.kind == BodyKind::Dynamic;
-        let any = |has: fn(&crate::engine::bodies::ShapeDef) -> bool| body.shapes.iter().any(has);
+        let any = |has: fn(&crate::bodies::ShapeDef) -> bool| body.shapes.iter().any(has);
         self.friction.add(any(|s| s.friction as f32 > 0.0), dynamic);
         self.corner.add(any(|s| !matches!(s.shape, Shape::Circle { .. })), dynamic);
         self.spins |= body.kind != BodyKind::Static && body.angular_velocity as f32 != 0.0;

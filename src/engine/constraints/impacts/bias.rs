@@ -15,12 +15,12 @@
 //! Source: `catto2007box2d` (`b2ContactSolver`, velocity bias, Box2D 1 to 2.4).
 
 use super::restitution::{largest, point, restitution_of};
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::bounces::Bounces;
-use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, Lanes};
+use crate::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::bounces::Bounces;
+use crate::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
+use crate::contacts::Contact;
+use crate::lanes::{BodyRow, Lanes};
 
 /// Side record: per point u (m/s; zero if it does not bounce) and its effective mass (kg).
 pub(super) const fn stride(points: usize) -> usize {

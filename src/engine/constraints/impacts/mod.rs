@@ -8,8 +8,8 @@
 //! | [`ImpactLaw::Waves`] | bodies bounce before the step, wave by wave (`spread`) |
 //! | [`ImpactLaw::Solver`] | the solver's schedule does it |
 
-use crate::engine::constraints::records::bounces::Bounces;
-use crate::engine::params::RESTITUTION_THRESHOLD;
+use crate::constraints::records::bounces::Bounces;
+use crate::params::RESTITUTION_THRESHOLD;
 
 #[doc(hidden)]
 pub mod bias;

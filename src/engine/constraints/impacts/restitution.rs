@@ -9,13 +9,13 @@
 //!
 //! Source: `catto2024box2d`.
 
-use crate::engine::constraints::kernels::frame::turn;
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::bounces::Bounces;
-use crate::engine::constraints::records::features::{KernelFeatures, Layout, LayoutOf, OppositeKind};
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, LaneIndex, Lanes};
+use crate::constraints::kernels::frame::turn;
+use crate::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::bounces::Bounces;
+use crate::constraints::records::features::{KernelFeatures, Layout, LayoutOf, OppositeKind};
+use crate::contacts::Contact;
+use crate::lanes::{BodyRow, LaneIndex, Lanes};
 
 /// Side record: per point the rebound speed (m/s; zero if it does not bounce) and the largest normal impulse
 /// so far (N·s).

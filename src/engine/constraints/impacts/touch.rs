@@ -17,11 +17,11 @@
 //! that are solved before the step. In a crowd, where sweeps solve them, the motion of two bodies until they
 //! touch is not known.
 
-use crate::engine::constraints::kernels::frame::turn;
-use crate::engine::constraints::records::features::Layout;
-use crate::engine::contacts::{Contact, Manifold};
-use crate::engine::lanes::BodyRow;
-use crate::engine::narrowphase::circles::arrival;
+use crate::constraints::kernels::frame::turn;
+use crate::constraints::records::features::Layout;
+use crate::contacts::{Contact, Manifold};
+use crate::lanes::BodyRow;
+use crate::narrowphase::circles::arrival;
 use glam::Vec2;
 
 /// A round contact, with the frame of the beginning of the step.

@@ -8,14 +8,14 @@ pub mod chains;
 pub(crate) mod passes;
 pub mod rows;
 
-use crate::engine::bodies::Bodies;
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W};
-use crate::engine::constraints::kernels::pass::{PassMode, PassWidth, VectorTask, at_pass_width, at_width};
-use crate::engine::constraints::kernels::types::{Booked, ConstraintType, Placed, TypeInput, TypeRows};
-use crate::engine::constraints::records::links::{ChainLink, LinkImpulses, LinkRows, LinkRule};
-use crate::engine::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowStore, held};
-use crate::engine::narrowphase::lanes::PoseRow;
+use crate::bodies::Bodies;
+use crate::clock::Phase;
+use crate::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W};
+use crate::constraints::kernels::pass::{PassMode, PassWidth, VectorTask, at_pass_width, at_width};
+use crate::constraints::kernels::types::{Booked, ConstraintType, Placed, TypeInput, TypeRows};
+use crate::constraints::records::links::{ChainLink, LinkImpulses, LinkRows, LinkRule};
+use crate::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowStore, held};
+use crate::narrowphase::lanes::PoseRow;
 use chains::records::Linked;
 use glam::Vec2;
 use passes::{

@@ -1,12 +1,12 @@
 //! What each pass does with the rows of joints.
 
 use super::rows::{JointPair, JointPass, VELOCITY, dot};
-use crate::engine::constraints::kernels::frame::{DX, DY, TURN};
-use crate::engine::constraints::kernels::pass::VectorTask;
-use crate::engine::constraints::kernels::velocity::rules::Softness;
-use crate::engine::constraints::numerics::small::solve;
-use crate::engine::constraints::records::rows::{Jacobian, ROWS, RowBlock, RowLaw};
-use crate::engine::lanes::Lanes;
+use crate::constraints::kernels::frame::{DX, DY, TURN};
+use crate::constraints::kernels::pass::VectorTask;
+use crate::constraints::kernels::velocity::rules::Softness;
+use crate::constraints::numerics::small::solve;
+use crate::constraints::records::rows::{Jacobian, ROWS, RowBlock, RowLaw};
+use crate::lanes::Lanes;
 use std::ops::{Deref, DerefMut};
 
 /// Makes passes dereference to the pair of bodies that they work on.

@@ -47,11 +47,11 @@
 //! The error x is that at the beginning of the substep. Relaxing sweeps use it as well, although bodies have
 //! moved since.
 
-use crate::engine::constraints::joints::ANCHORS;
-use crate::engine::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, turn};
-use crate::engine::constraints::numerics::small::solve;
-pub use crate::engine::constraints::records::rows::{Jacobian, RowBlock, RowLaw, cross};
-use crate::engine::lanes::Lanes;
+use crate::constraints::joints::ANCHORS;
+use crate::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, turn};
+use crate::constraints::numerics::small::solve;
+pub use crate::constraints::records::rows::{Jacobian, RowBlock, RowLaw, cross};
+use crate::lanes::Lanes;
 use std::f32::consts::TAU;
 use std::ops::Deref;
 

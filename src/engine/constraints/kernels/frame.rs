@@ -39,8 +39,8 @@
 //! A unit impulse along u changes the velocity along u by k = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (r_a × u)² + I_b⁻¹ (r_b ×
 //! u)²; the effective mass is 1/k.
 
-use crate::engine::constraints::records::features::{KernelFeatures, Layout, Opposite};
-use crate::engine::lanes::{LaneIndex, Lanes, RowStore};
+use crate::constraints::records::features::{KernelFeatures, Layout, Opposite};
+use crate::lanes::{LaneIndex, Lanes, RowStore};
 
 pub(crate) const VX: usize = 0;
 pub(crate) const VY: usize = 1;
@@ -162,7 +162,7 @@ pub(crate) fn turn<L: Lanes>(angle: L) -> (L, L) {
 }
 
 /// Arms r × n and r × t of bodies a and b, turned by Δθ (see
-/// [`crate::engine::constraints::kernels::position`]): R r × n = cos Δθ (r × n) + sin Δθ (r × t), R r × t =
+/// [`crate::constraints::kernels::position`]): R r × n = cos Δθ (r × n) + sin Δθ (r × t), R r × t =
 /// cos Δθ (r × t) − sin Δθ (r × n).
 #[inline(always)]
 pub(crate) fn turned<L: Lanes>(arm_n: [L; 2], arm_t: [L; 2], sine: [L; 2], versine: [L; 2]) -> [[L; 2]; 2] {

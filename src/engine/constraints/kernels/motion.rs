@@ -9,9 +9,9 @@
 //! Explicit Euler updates x with the old v; the last factor is then (1 − 1/n), and every orbit gains energy.
 //! Damping of rate c is integrated implicitly, v ← v/(1 + h c), which is stable for any h.
 
-use crate::engine::bodies::{Bodies, BodyKind};
-use crate::engine::constraints::records::features::Features;
-use crate::engine::lanes::{BodyRow, held};
+use crate::bodies::{Bodies, BodyKind};
+use crate::constraints::records::features::Features;
+use crate::lanes::{BodyRow, held};
 use glam::Vec2;
 use wide::{f32x4, f32x8};
 

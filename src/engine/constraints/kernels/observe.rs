@@ -1,14 +1,14 @@
 //! The contact law behind a rule, measured on the rule itself.
 //!
-//! A sweep under a [`crate::engine::constraints::kernels::velocity::rules::NormalRule`] converges, if at all,
+//! A sweep under a [`crate::constraints::kernels::velocity::rules::NormalRule`] converges, if at all,
 //! to a fixed point of the rule. The contact law at this fixed point is found by evaluating the rule, so a
 //! solver is never measured against a law that it does not solve. Nothing is observed unless
-//! [`crate::engine::constraints::step::Workspace::observe`] is set; otherwise a step costs one extra branch
+//! [`crate::constraints::step::Workspace::observe`] is set; otherwise a step costs one extra branch
 //! per sweep.
 
-use crate::engine::constraints::kernels::velocity::rules::Softness;
-use crate::engine::constraints::kernels::velocity::sweep::ContactLaw;
-use crate::engine::lanes::BodyRow;
+use crate::constraints::kernels::velocity::rules::Softness;
+use crate::constraints::kernels::velocity::sweep::ContactLaw;
+use crate::lanes::BodyRow;
 use std::fmt;
 
 /// The rule of a velocity sweep, as a function of scalars.

@@ -4,13 +4,13 @@
 //! once. Kernels implement the generic [`Pass`]; schedules use [`AnyPass`]. The instance is chosen once per
 //! pass, outside of all loops.
 
-use crate::engine::constraints::kernels::velocity::rules::Softness;
-use crate::engine::constraints::records::batches::{Batches, Part};
-use crate::engine::constraints::records::bounces::Bounces;
-use crate::engine::constraints::records::features::{Features, Kernel, KernelFeatures, Layout, OppositeKind};
-use crate::engine::constraints::records::kept::Kept;
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, LaneWidth, Lanes};
+use crate::constraints::kernels::velocity::rules::Softness;
+use crate::constraints::records::batches::{Batches, Part};
+use crate::constraints::records::bounces::Bounces;
+use crate::constraints::records::features::{Features, Kernel, KernelFeatures, Layout, OppositeKind};
+use crate::constraints::records::kept::Kept;
+use crate::contacts::Contact;
+use crate::lanes::{BodyRow, LaneWidth, Lanes};
 
 /// Input of a pass: the rows of all bodies and one set of batches.
 pub struct PassInput<'a> {
@@ -94,7 +94,7 @@ pub enum PassMode {
 }
 
 /// Task of a pass between impulses λ, a vector x and in some tasks a second vector y.
-/// [`rows`](crate::engine::constraints::joints::rows) defines b and R.
+/// [`rows`](crate::constraints::joints::rows) defines b and R.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VectorTask {
     /// x = λ
@@ -136,7 +136,7 @@ macro_rules! at_pass_width {
         match $width {
             #[cfg(feature = "count")]
             PassWidth { counted: true, width: LaneWidth::W1 } => {
-                $($pass)::+::<$crate::engine::lanes::Counted>($($arg),*)
+                $($pass)::+::<$crate::lanes::Counted>($($arg),*)
             }
             PassWidth { width, .. } => at_width!(width, $($pass)::+($($arg),*)),
         }
@@ -146,7 +146,7 @@ pub(crate) use at_pass_width;
 
 /// A pass over contacts, compiled per width and features.
 ///
-/// To add one, implement this trait; [`crate::engine::constraints::kernels::velocity::sweep::Sweep`] is an
+/// To add one, implement this trait; [`crate::constraints::kernels::velocity::sweep::Sweep`] is an
 /// example.
 pub trait Pass {
     /// Memory accesses per contact with records of this layout.
@@ -193,7 +193,7 @@ pub struct PassWidth {
     pub counted: bool,
 }
 
-/// A type-erased [`Pass`], the argument of [`crate::engine::constraints::step::Passes::run`].
+/// A type-erased [`Pass`], the argument of [`crate::constraints::step::Passes::run`].
 pub trait AnyPass {
     /// [`Pass::traffic`]
     fn traffic_of(&self, layout: &Layout, opposite: OppositeKind) -> PerLane;

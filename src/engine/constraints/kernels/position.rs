@@ -22,16 +22,16 @@
 //! because R n = cos Δθ n − sin Δθ t and R t = cos Δθ t + sin Δθ n; n itself is fixed. So the two arms in the
 //! record suffice, and 1/m_eff = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (R r_a × n)² + I_b⁻¹ (R r_b × n)².
 
-use crate::engine::constraints::kernels::frame::{
+use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, arms, spin, to_frame, turn, with_arms,
 };
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
-use crate::engine::constraints::kernels::stages::{for_each_batch, over_segments};
-use crate::engine::constraints::records::batches::{Batches, Segment};
-use crate::engine::constraints::records::features::{
+use crate::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
+use crate::constraints::kernels::stages::{for_each_batch, over_segments};
+use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::lanes::{BodyRow, Lanes};
+use crate::lanes::{BodyRow, Lanes};
 
 /// One sweep; see the [module](self).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,14 +1,14 @@
 //! Fills constraint records from contacts at the start of a step, and stores impulses in the contacts at its
 //! end.
 
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::kernels::stages::over_segments;
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::features::{
+use crate::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::constraints::kernels::stages::over_segments;
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::contacts::{Contact, quad};
-use crate::engine::lanes::{BodyRow, Lanes, Quad, prefetch_records};
+use crate::contacts::{Contact, quad};
+use crate::lanes::{BodyRow, Lanes, Quad, prefetch_records};
 
 const INV_MASS: usize = 3;
 const INV_INERTIA: usize = 7;

@@ -20,17 +20,15 @@
 //! and 3 %. Four stages cost 4 % more than three if gathering is separated from forming rows, and 4 and 6 %
 //! more if positions are separated from velocities.
 
-use crate::engine::constraints::kernels::frame::{
-    BodyPair, INV_INERTIA, INV_MASS, VX, VY, W, apply, to_frame,
-};
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::features::{KernelFeatures, Layout, Opposite};
-use crate::engine::lanes::{LaneIndex, Lanes, RowStore, align_frame, prefetch};
+use crate::constraints::kernels::frame::{BodyPair, INV_INERTIA, INV_MASS, VX, VY, W, apply, to_frame};
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::features::{KernelFeatures, Layout, Opposite};
+use crate::lanes::{LaneIndex, Lanes, RowStore, align_frame, prefetch};
 
 /// Runs `$kernel::<L, N, O, …>` over every segment, with `O` chosen by the segment.
 macro_rules! over_segments {
     ($kernel:ident, $l:ty, $n:ty $(, $r:ty)*; $rows:expr, $batches:expr $(, $arg:expr)*) => {
-        $crate::engine::lanes::align_frame();
+        $crate::lanes::align_frame();
         for i in 0..$batches.visits().len() {
             let segment = $batches.visits()[i];
             match segment.opposite {

@@ -10,17 +10,17 @@
 //! constraints that provide no blocks have no effect under such a solver. The impulses of a type are part of
 //! the vectors of vector-based solvers if [`ConstraintType::rows`] gives their number.
 
-use crate::engine::bodies::Bodies;
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::pass::{PassMode, PassWidth};
-use crate::engine::constraints::kernels::velocity::jacobi::SummedRows;
-use crate::engine::constraints::kernels::velocity::rules::Softness;
-use crate::engine::constraints::records::batches::Batches;
-use crate::engine::constraints::records::links::{ChainLink, LinkImpulses, LinkRows, LinkRule};
-use crate::engine::constraints::records::order::SweepOrder;
-use crate::engine::constraints::records::rows::RowBlock;
-use crate::engine::lanes::{Block, BodyRow, IndexList, LaneIndex, Lanes, RowStore};
-use crate::engine::narrowphase::lanes::PoseRow;
+use crate::bodies::Bodies;
+use crate::clock::Phase;
+use crate::constraints::kernels::pass::{PassMode, PassWidth};
+use crate::constraints::kernels::velocity::jacobi::SummedRows;
+use crate::constraints::kernels::velocity::rules::Softness;
+use crate::constraints::records::batches::Batches;
+use crate::constraints::records::links::{ChainLink, LinkImpulses, LinkRows, LinkRule};
+use crate::constraints::records::order::SweepOrder;
+use crate::constraints::records::rows::RowBlock;
+use crate::lanes::{Block, BodyRow, IndexList, LaneIndex, Lanes, RowStore};
+use crate::narrowphase::lanes::PoseRow;
 use std::any::Any;
 use std::fmt;
 
@@ -112,10 +112,9 @@ impl RowStore for TypeRows<'_> {
 /// below does nothing:
 ///
 /// ```
-/// # use simpulse_engine as simpulse;
-/// use simpulse::engine::bodies::{BodyDef, ShapeDef};
-/// use simpulse::engine::constraints::kernels::types::{ConstraintType, TypeInput};
-/// use simpulse::engine::{solvers, world::{Settings, World}};
+/// use simpulse_engine::bodies::{BodyDef, ShapeDef};
+/// use simpulse_engine::constraints::kernels::types::{ConstraintType, TypeInput};
+/// use simpulse_engine::{solvers, world::{Settings, World}};
 ///
 /// #[derive(Clone, Debug)]
 /// struct Idle(Vec<[u32; 2]>);
@@ -266,7 +265,7 @@ impl Joined {
     }
 
     /// Its batches, colored and serial.
-    pub(in crate::engine) fn batches_mut(&mut self) -> [&mut Batches; 2] {
+    pub(crate) fn batches_mut(&mut self) -> [&mut Batches; 2] {
         [&mut self.lanes, &mut self.serial]
     }
 

@@ -1,6 +1,6 @@
 //! The friction cone |λt| ≤ µ λn of one contact point.
 
-use crate::engine::lanes::Lanes;
+use crate::lanes::Lanes;
 
 /// The nearest point of the cone. In the plane the cone is a wedge: a point inside it stays, a point
 /// inside its polar goes to the tip, and any other point goes to the nearer side, (1, ±µ) times

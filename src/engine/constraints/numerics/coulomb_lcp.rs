@@ -25,8 +25,8 @@
 //! A row with its own bounds, |λ| ≤ c, is a tangential row with the number c instead of µ λn: the last line
 //! becomes 0 ≤ σ ⊥ c − β⁺ − β⁻ ≥ 0. A row with λ ≥ 0 is a point without friction.
 
-use crate::engine::constraints::numerics::lemke::{LemkeOutcome, lemke};
-use crate::engine::constraints::numerics::matrix::Matrix;
+use crate::constraints::numerics::lemke::{LemkeOutcome, lemke};
+use crate::constraints::numerics::matrix::Matrix;
 
 /// `[normal, tangential]` of one contact point: impulses (N·s) or velocities (m/s).
 pub type DPair = [f64; 2];

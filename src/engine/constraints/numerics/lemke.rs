@@ -14,7 +14,7 @@
 //! `x_B + T x_N = q̄`. The lexicographic rule compares rows of (q̄ | B⁻¹) / T_·c; the columns of B⁻¹
 //! are those of w₁ … w_n: unit vectors while basic, columns of T otherwise.
 
-use crate::engine::constraints::numerics::matrix::{Lu, Matrix};
+use crate::constraints::numerics::matrix::{Lu, Matrix};
 use std::cmp::Ordering;
 
 /// Pivots between two rebuilds of the tableau. A rebuild costs about as much as n/2 pivots.

@@ -1,6 +1,6 @@
 //! Symmetric systems of two or three rows, in lanes.
 
-use crate::engine::lanes::Lanes;
+use crate::lanes::Lanes;
 
 /// The solution of K x = r. By LDLᵀ, except for two rows, which take one division. Unknowns without a
 /// positive pivot are zero.

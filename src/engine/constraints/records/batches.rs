@@ -1,9 +1,9 @@
 //! Assignment of contacts to lanes: batches, segments, and the buffer of records.
 
-use crate::engine::constraints::records::features::{Features, Layout, LayoutOf, OppositeKind};
-use crate::engine::constraints::records::order::SweepOrder;
-pub use crate::engine::constraints::records::segment::Segment;
-use crate::engine::lanes::{Block, IndexList, Indices, Lanes, held};
+use crate::constraints::records::features::{Features, Layout, LayoutOf, OppositeKind};
+use crate::constraints::records::order::SweepOrder;
+pub use crate::constraints::records::segment::Segment;
+use crate::lanes::{Block, IndexList, Indices, Lanes, held};
 use std::mem::size_of_val;
 use std::ops::Range;
 

@@ -1,10 +1,10 @@
 //! Side records for restitution. Scenes in which nothing bounces have none.
 
-use crate::engine::constraints::records::segment::Segment;
-use crate::engine::lanes::{Block, Lanes, held};
+use crate::constraints::records::segment::Segment;
+use crate::lanes::{Block, Lanes, held};
 use std::slice::ChunksExactMut;
 
-/// Side records. The law of impacts defines their contents ([`crate::engine::constraints::impacts`]).
+/// Side records. The law of impacts defines their contents ([`crate::constraints::impacts`]).
 #[derive(Clone, Debug, Default)]
 pub struct Bounces {
     /// Lane vectors per record.

@@ -4,7 +4,7 @@
 //! (shock propagation). Built only for a solver that requests it, in time linear in contacts.
 //! Edges have the numbers of their contacts. The graph does not depend on what an edge stands for.
 
-use crate::engine::lanes::held;
+use crate::lanes::held;
 
 /// Level of a body that no chain of contacts connects to the ground.
 pub const UNSUPPORTED: u32 = u32::MAX;

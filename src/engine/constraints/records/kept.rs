@@ -4,8 +4,8 @@
 //! its shape pair and its feature id, as for its impulses. A new point starts with zeros. Solvers that keep
 //! nothing have empty arrays and cost no look-ups.
 
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{LaneVec, held};
+use crate::contacts::Contact;
+use crate::lanes::{LaneVec, held};
 
 /// How many numbers a solver keeps from step to step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! Rigid rows of joints that are links of chains, in lanes; see `constraints/joints/chains`.
 
-use crate::engine::lanes::held;
+use crate::lanes::held;
 use bytemuck::Pod;
 use wide::f32x8;
 

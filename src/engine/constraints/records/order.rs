@@ -5,7 +5,7 @@
 //! by one. The order does not depend on the width. Kernels do not depend on the order: they run over the
 //! segments that they are given.
 
-use crate::engine::constraints::records::segment::Segment;
+use crate::constraints::records::segment::Segment;
 
 /// The order in which a sweep visits contacts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -81,7 +81,7 @@ pub(crate) fn mixed(x: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::constraints::records::features::OppositeKind;
+    use crate::constraints::records::features::OppositeKind;
 
     fn segment(stage: u32, first_lane: usize, contacts: usize, disjoint: bool) -> Segment {
         let opposite = OppositeKind::Dynamic;

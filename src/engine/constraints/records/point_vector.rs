@@ -12,8 +12,8 @@
 //! two blocks, the second of which is zero. Arithmetic on single entries does not depend on the width, so it
 //! always uses [`Wide`], which a build lowers to the instructions that it has.
 
-use crate::engine::constraints::records::batches::Batches;
-use crate::engine::lanes::{Block, Lanes, held};
+use crate::constraints::records::batches::Batches;
+use crate::lanes::{Block, Lanes, held};
 use wide::f32x16;
 
 /// Lanes for arithmetic on single entries.

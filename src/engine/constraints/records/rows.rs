@@ -2,8 +2,8 @@
 //!
 //! They are derived in `constraints/joints/rows.rs`.
 
-use crate::engine::constraints::numerics::small::solve;
-use crate::engine::lanes::Lanes;
+use crate::constraints::numerics::small::solve;
+use crate::lanes::Lanes;
 
 /// How the error of a row changes with velocities; see `constraints/joints/rows.rs`.
 #[derive(Clone, Copy, Debug)]

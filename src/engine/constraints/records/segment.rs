@@ -1,6 +1,6 @@
 //! Segments: the batches that one kernel runs over.
 
-use crate::engine::constraints::records::features::OppositeKind;
+use crate::constraints::records::features::OppositeKind;
 
 /// Batches of one color and one kind of body a, which one kernel runs over.
 ///
@@ -16,11 +16,11 @@ pub struct Segment {
     /// Number of batches of `width` lanes.
     pub batches: usize,
     /// Slot of its first contact in vectors over contact points
-    /// ([`crate::engine::constraints::records::point_vector`]).
+    /// ([`crate::constraints::records::point_vector`]).
     pub first_slot: usize,
     /// Where the first record starts in the buffer, in lane vectors.
     pub first_vector: usize,
-    /// Lane vectors of a record ([`crate::engine::constraints::records::features::Layout::stride`]).
+    /// Lane vectors of a record ([`crate::constraints::records::features::Layout::stride`]).
     pub stride: usize,
     /// Its place in a sweep: stages are solved one after the other. Constraints of other types with the same
     /// stage share its color.

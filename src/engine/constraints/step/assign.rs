@@ -1,13 +1,13 @@
 //! Assignment of constraints to lanes: by colors, or one after the other.
 
 use super::Workspace;
-use crate::engine::coloring::{Coloring, EXEMPT};
-use crate::engine::constraints::records::batches::Place;
-use crate::engine::constraints::records::features::{Features, Layout, OppositeKind};
-use crate::engine::constraints::records::graph::{Graph, UNSUPPORTED};
-use crate::engine::constraints::records::order::mixed;
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{LaneWidth, held};
+use crate::coloring::{Coloring, EXEMPT};
+use crate::constraints::records::batches::Place;
+use crate::constraints::records::features::{Features, Layout, OppositeKind};
+use crate::constraints::records::graph::{Graph, UNSUPPORTED};
+use crate::constraints::records::order::mixed;
+use crate::contacts::Contact;
+use crate::lanes::{LaneWidth, held};
 
 /// A constraint that gets a lane.
 #[derive(Clone, Copy, Debug)]

@@ -1,11 +1,11 @@
 //! Passes over bodies.
 
 use super::Passes;
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::motion::Motion;
-use crate::engine::constraints::kernels::velocity::masses::{EffectiveMasses, ScaledMasses};
-use crate::engine::constraints::records::graph::Graph;
-use crate::engine::lanes::BodyRow;
+use crate::clock::Phase;
+use crate::constraints::kernels::motion::Motion;
+use crate::constraints::kernels::velocity::masses::{EffectiveMasses, ScaledMasses};
+use crate::constraints::records::graph::Graph;
+use crate::lanes::BodyRow;
 
 impl Passes<'_> {
     /// Time for which bodies move with the velocities of [`Self::integrate_velocities`] (s): h, or 0 if they

@@ -2,10 +2,10 @@
 //! friction holds points at their places; see `kernels/velocity/sticky.rs`.
 
 use super::{Passes, StepParts, Workspace};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::velocity::sticky::{BookDrift, LoadDrift, Sticky, StickySweep};
-use crate::engine::constraints::kernels::velocity::sweep::ContactLaw;
-use crate::engine::constraints::records::point_vector::PointVector;
+use crate::clock::Phase;
+use crate::constraints::kernels::velocity::sticky::{BookDrift, LoadDrift, Sticky, StickySweep};
+use crate::constraints::kernels::velocity::sweep::ContactLaw;
+use crate::constraints::records::point_vector::PointVector;
 
 /// Drifts within a step. Between steps they are in [`super::Passes::kept`], one float per contact point.
 #[derive(Clone, Debug, Default)]

@@ -1,14 +1,14 @@
 //! Impacts, and the impulses of a step.
 
 use super::{Passes, Workspace};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::impacts::restitution::Rebound;
-use crate::engine::constraints::impacts::spread::{self, Find, SpreadInput, VISITS};
-use crate::engine::constraints::impacts::{ImpactLaw, bias, restitution};
-use crate::engine::constraints::kernels::pass::PassMode;
-use crate::engine::constraints::records::batches::Part;
-use crate::engine::constraints::records::bounces::Bounces;
-use crate::engine::params::RESTITUTION_THRESHOLD;
+use crate::clock::Phase;
+use crate::constraints::impacts::restitution::Rebound;
+use crate::constraints::impacts::spread::{self, Find, SpreadInput, VISITS};
+use crate::constraints::impacts::{ImpactLaw, bias, restitution};
+use crate::constraints::kernels::pass::PassMode;
+use crate::constraints::records::batches::Part;
+use crate::constraints::records::bounces::Bounces;
+use crate::params::RESTITUTION_THRESHOLD;
 
 /// How impacts spread; see [`spread`].
 #[derive(Clone, Copy, Debug)]

@@ -18,21 +18,21 @@ pub(crate) use impacts::Spreading;
 pub use solver::{Collision, CollisionScene, Schedule, Solver};
 pub use workspace::{IterationObserver, StepInput, Watch, WorkCount, Workspace};
 
-use crate::engine::clock::{Clock, Phase};
-use crate::engine::constraints::impacts::ImpactLaw;
-use crate::engine::constraints::kernels::pass::{AnyPass, PassInput, PassMode, PassWidth, PerLane};
-use crate::engine::constraints::kernels::prepare::{Prepare, Store};
-use crate::engine::constraints::kernels::types::{ConstraintType, Joined, TypeInput, TypeRows};
-use crate::engine::constraints::kernels::velocity::rules::Softness;
-use crate::engine::constraints::records::batches::{Batches, Part};
-use crate::engine::constraints::records::features::Layout;
-use crate::engine::constraints::records::kept::Kept;
-use crate::engine::constraints::records::order::SweepOrder;
-use crate::engine::constraints::vectors::system::Others;
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, LaneWidth};
-use crate::engine::narrowphase::Margins;
-use crate::engine::params::{Budget, MAX_POSITION_CORRECTION, MAX_PUSH_SPEED};
+use crate::clock::{Clock, Phase};
+use crate::constraints::impacts::ImpactLaw;
+use crate::constraints::kernels::pass::{AnyPass, PassInput, PassMode, PassWidth, PerLane};
+use crate::constraints::kernels::prepare::{Prepare, Store};
+use crate::constraints::kernels::types::{ConstraintType, Joined, TypeInput, TypeRows};
+use crate::constraints::kernels::velocity::rules::Softness;
+use crate::constraints::records::batches::{Batches, Part};
+use crate::constraints::records::features::Layout;
+use crate::constraints::records::kept::Kept;
+use crate::constraints::records::order::SweepOrder;
+use crate::constraints::vectors::system::Others;
+use crate::contacts::Contact;
+use crate::lanes::{BodyRow, LaneWidth};
+use crate::narrowphase::Margins;
+use crate::params::{Budget, MAX_POSITION_CORRECTION, MAX_PUSH_SPEED};
 
 /// One step's problem, prepared.
 ///
@@ -129,7 +129,7 @@ impl<'a> Passes<'a> {
         self.input.h * self.input.budget.substeps as f32
     }
 
-    /// Size of typical bodies (m), [`Settings::length_unit`](crate::engine::world::Settings::length_unit).
+    /// Size of typical bodies (m), [`Settings::length_unit`](crate::world::Settings::length_unit).
     pub fn length_unit(&self) -> f32 {
         self.input.length_unit
     }

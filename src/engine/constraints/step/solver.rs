@@ -1,14 +1,14 @@
 //! The interface of solvers: their schedule, and their hooks around collision.
 
 use super::Passes;
-use crate::engine::bodies::Bodies;
-use crate::engine::constraints::kernels::types::Joined;
-use crate::engine::constraints::records::graph::Graph;
-use crate::engine::constraints::records::kept::Kept;
-use crate::engine::contacts::Contact;
-use crate::engine::narrowphase::candidate::Candidates;
-use crate::engine::narrowphase::circles::Rolling;
-use crate::engine::params::{Parameters, Without};
+use crate::bodies::Bodies;
+use crate::constraints::kernels::types::Joined;
+use crate::constraints::records::graph::Graph;
+use crate::constraints::records::kept::Kept;
+use crate::contacts::Contact;
+use crate::narrowphase::candidate::Candidates;
+use crate::narrowphase::circles::Rolling;
+use crate::params::{Parameters, Without};
 use glam::Vec2;
 use std::fmt;
 

@@ -1,18 +1,18 @@
 //! Passes over constraints: warm starts, velocity sweeps and position sweeps.
 
 use super::{Passes, ROW, Workspace};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::joints::chains::{ChainStage, Chains};
-use crate::engine::constraints::kernels::observe::ObservedRule;
-use crate::engine::constraints::kernels::pass::{AnyPass, PassMode};
-use crate::engine::constraints::kernels::position::PositionSweep;
-use crate::engine::constraints::kernels::velocity::block::BlockSweep;
-use crate::engine::constraints::kernels::velocity::jacobi::{self, JacobiSweep};
-use crate::engine::constraints::kernels::velocity::masses::{EffectiveMasses, ScaledMasses};
-use crate::engine::constraints::kernels::velocity::rules::{NormalRule, Rule, Soft};
-use crate::engine::constraints::kernels::velocity::sweep::{ContactLaw, Sweep, VelocitySweep};
-use crate::engine::constraints::kernels::velocity::warm_start::WarmStart;
-use crate::engine::lanes::BodyRow;
+use crate::clock::Phase;
+use crate::constraints::joints::chains::{ChainStage, Chains};
+use crate::constraints::kernels::observe::ObservedRule;
+use crate::constraints::kernels::pass::{AnyPass, PassMode};
+use crate::constraints::kernels::position::PositionSweep;
+use crate::constraints::kernels::velocity::block::BlockSweep;
+use crate::constraints::kernels::velocity::jacobi::{self, JacobiSweep};
+use crate::constraints::kernels::velocity::masses::{EffectiveMasses, ScaledMasses};
+use crate::constraints::kernels::velocity::rules::{NormalRule, Rule, Soft};
+use crate::constraints::kernels::velocity::sweep::{ContactLaw, Sweep, VelocitySweep};
+use crate::constraints::kernels::velocity::warm_start::WarmStart;
+use crate::lanes::BodyRow;
 
 impl Passes<'_> {
     /// Sets all accumulated impulses to zero, for solvers without warm starting.
@@ -121,7 +121,7 @@ impl Passes<'_> {
 
     /// Pass over joints alone: their records take up the changes by [`ConstraintType::replace`].
     ///
-    /// [`ConstraintType::replace`]: crate::engine::constraints::kernels::types::ConstraintType::replace
+    /// [`ConstraintType::replace`]: crate::constraints::kernels::types::ConstraintType::replace
     pub fn reload_types(&mut self) {
         if !self.work.types.is_empty() && self.input.phases.runs(Phase::Solve) {
             self.over_types_alone(Phase::Prepare, PassMode::InTurn);
@@ -153,7 +153,7 @@ impl Passes<'_> {
     }
 
     /// Constraint pass: as [`Self::sweep`], but the two normal rows of a contact are solved
-    /// together; see [`crate::engine::constraints::kernels::velocity::block`].
+    /// together; see [`crate::constraints::kernels::velocity::block`].
     pub fn block_sweep<R: NormalRule>(&mut self, phase: Phase, rule: R) {
         self.sweep_by(phase, &mut BlockSweep::<_, false>(rule), &Sweep(rule));
     }
@@ -173,7 +173,7 @@ impl Passes<'_> {
 
     /// Constraint pass: every contact reads the velocities from before the pass. The changes of each body,
     /// times `relaxation`, are summed up in `sums`; see
-    /// [`crate::engine::constraints::kernels::velocity::jacobi`]. `split`: bodies that are split into copies.
+    /// [`crate::constraints::kernels::velocity::jacobi`]. `split`: bodies that are split into copies.
     pub fn jacobi_sweep(
         &mut self,
         phase: Phase,

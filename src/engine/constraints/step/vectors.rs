@@ -1,11 +1,11 @@
 //! The problem of a step as vectors.
 
 use super::{Passes, Workspace};
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::types::Joined;
-use crate::engine::constraints::records::point_vector::PointVector;
-use crate::engine::constraints::vectors::system::{Others, System};
-use crate::engine::lanes::Block;
+use crate::clock::Phase;
+use crate::constraints::kernels::types::Joined;
+use crate::constraints::records::point_vector::PointVector;
+use crate::constraints::vectors::system::{Others, System};
+use crate::lanes::Block;
 
 impl Passes<'_> {
     /// All impulses and velocities as vectors, in an order that does not depend on the width.
@@ -49,7 +49,7 @@ impl Passes<'_> {
     }
 
     /// Effective masses of all rows (kg, kg·m²), for
-    /// [`energy`](crate::engine::constraints::records::point_vector::energy). `None` in a scene without joints,
+    /// [`energy`](crate::constraints::records::point_vector::energy). `None` in a scene without joints,
     /// whose rows have one unit.
     pub fn energy_masses(&mut self, phase: Phase) -> Option<PointVector> {
         let mut masses = self.system().has_joints().then(|| self.vector())?;

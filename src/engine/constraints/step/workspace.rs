@@ -1,18 +1,18 @@
 //! Working data, inputs and counts of a step.
 
-use crate::engine::clock::PhaseFilter;
-use crate::engine::constraints::impacts::{ImpactLaw, ImpactRecords};
-use crate::engine::constraints::kernels::motion::Motion;
-use crate::engine::constraints::kernels::observe::ObservedRule;
-use crate::engine::constraints::kernels::types::Joined;
-use crate::engine::constraints::records::batches::Batches;
-use crate::engine::constraints::records::features::Features;
-use crate::engine::constraints::records::kept::Kept;
-use crate::engine::constraints::records::point_vector::PointVector;
-use crate::engine::constraints::vectors::system::System;
-use crate::engine::lanes::BodyRow;
-use crate::engine::narrowphase::lanes::PoseRow;
-use crate::engine::params::{Budget, Parameters, Without};
+use crate::clock::PhaseFilter;
+use crate::constraints::impacts::{ImpactLaw, ImpactRecords};
+use crate::constraints::kernels::motion::Motion;
+use crate::constraints::kernels::observe::ObservedRule;
+use crate::constraints::kernels::types::Joined;
+use crate::constraints::records::batches::Batches;
+use crate::constraints::records::features::Features;
+use crate::constraints::records::kept::Kept;
+use crate::constraints::records::point_vector::PointVector;
+use crate::constraints::vectors::system::System;
+use crate::lanes::BodyRow;
+use crate::narrowphase::lanes::PoseRow;
+use crate::params::{Budget, Parameters, Without};
 use std::fmt;
 
 /// Working data of a step. Kept from step to step, so that nothing is allocated.
@@ -116,7 +116,7 @@ pub struct StepInput {
     pub without: Without,
     /// Which phases run.
     pub phases: PhaseFilter,
-    /// Whether to sum impulses into [`crate::engine::contacts::Contact::step_impulse`].
+    /// Whether to sum impulses into [`crate::contacts::Contact::step_impulse`].
     pub record_impulses: bool,
     /// Impact law of the run.
     pub impacts: ImpactLaw,

@@ -1,10 +1,10 @@
 //! Rows of individual joints, for methods that assemble a system of all rows of a scene.
 
-use crate::engine::clock::Phase;
-use crate::engine::constraints::kernels::pass::PassMode;
-use crate::engine::constraints::kernels::types::Placed;
-use crate::engine::constraints::records::rows::{ROWS, RowBlock, RowLaw};
-use crate::engine::constraints::vectors::system::System;
+use crate::clock::Phase;
+use crate::constraints::kernels::pass::PassMode;
+use crate::constraints::kernels::types::Placed;
+use crate::constraints::records::rows::{ROWS, RowBlock, RowLaw};
+use crate::constraints::vectors::system::System;
 
 /// The blocks of all joints, ordered by type.
 #[derive(Clone, Debug, Default)]

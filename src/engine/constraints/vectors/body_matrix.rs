@@ -11,11 +11,11 @@
 //! points they touch. The matrix is factorized as 1 + M^(−1/2) Jᵀ S J M^(−1/2). This form is symmetric,
 //! has no pivot below one whatever the masses, and drops bodies that do not move.
 
-use crate::engine::constraints::numerics::envelope::Envelope;
-use crate::engine::constraints::records::rows::{ROWS, RowBlock};
-use crate::engine::constraints::vectors::blocks::JointBlocks;
-use crate::engine::constraints::vectors::system::{Pair, System};
-use crate::engine::lanes::BodyRow;
+use crate::constraints::numerics::envelope::Envelope;
+use crate::constraints::records::rows::{ROWS, RowBlock};
+use crate::constraints::vectors::blocks::JointBlocks;
+use crate::constraints::vectors::system::{Pair, System};
+use crate::lanes::BodyRow;
 
 /// The matrix and its factor. Keeps its memory between steps.
 #[derive(Clone, Debug, Default)]

@@ -5,10 +5,8 @@
 //! p = β p + r, and the next iteration starts from λ⁺ + β p. In scenes with joints, |r|² = Σ r²/m with the
 //! effective mass m of each row: joint rows are in N·s and N·m·s, whose squares cannot be added.
 
-use crate::engine::constraints::records::point_vector::{
-    PointVector, difference, energy, scaled, sum, update,
-};
-use crate::engine::constraints::vectors::system::System;
+use crate::constraints::records::point_vector::{PointVector, difference, energy, scaled, sum, update};
+use crate::constraints::vectors::system::System;
 
 /// State within a substep. Its vectors belong to the workspace.
 #[derive(Debug)]

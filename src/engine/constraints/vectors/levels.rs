@@ -28,10 +28,10 @@
 //! Places are positions within an island, whose bodies touch each other. The ground is not part of any
 //! island.
 
-use crate::engine::constraints::numerics::envelope::Envelope;
-use crate::engine::constraints::records::graph::{Graph, UNSUPPORTED};
-use crate::engine::constraints::vectors::system::{Pair, PointRows, System};
-use crate::engine::lanes::held;
+use crate::constraints::numerics::envelope::Envelope;
+use crate::constraints::records::graph::{Graph, UNSUPPORTED};
+use crate::constraints::vectors::system::{Pair, PointRows, System};
+use crate::lanes::held;
 
 /// Rigid motions in the plane.
 const MODES: usize = 3;

@@ -1,14 +1,14 @@
-//! Passes between contact records and [`PointVector`](crate::engine::constraints::PointVector)s: impulses in and out, J v, and M⁻¹ Jᵀ.
+//! Passes between contact records and [`PointVector`](crate::constraints::PointVector)s: impulses in and out, J v, and M⁻¹ Jᵀ.
 //!
 //! A pass is compiled once per width. Which quantities a record has is checked at run time, per batch,
 //! since passes are memory-bound. Impulses are applied color by color, in the order of warm starting.
 
-use crate::engine::constraints::kernels::frame::{INV_INERTIA, INV_MASS, VX, VY, W};
-use crate::engine::constraints::records::batches::{Batches, SegmentRecords};
-use crate::engine::constraints::records::features::{Features, Layout};
-use crate::engine::constraints::records::point_vector::places;
-use crate::engine::constraints::records::segment::Segment;
-use crate::engine::lanes::{Block, BodyRow, LaneIndex, Lanes, prefetch};
+use crate::constraints::kernels::frame::{INV_INERTIA, INV_MASS, VX, VY, W};
+use crate::constraints::records::batches::{Batches, SegmentRecords};
+use crate::constraints::records::features::{Features, Layout};
+use crate::constraints::records::point_vector::places;
+use crate::constraints::records::segment::Segment;
+use crate::lanes::{Block, BodyRow, LaneIndex, Lanes, prefetch};
 
 /// Input of a pass: the bodies, and one set of batches with its part of a vector.
 pub(crate) struct VectorInput<'a> {

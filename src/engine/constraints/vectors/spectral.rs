@@ -21,12 +21,12 @@
 //! f(λ + s d) = f(λ) + s g·d + ½ s² d·(K + R) d
 //! ```
 
-use crate::engine::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
-use crate::engine::constraints::records::point_vector::{
+use crate::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
+use crate::constraints::records::point_vector::{
     PointEntry, PointVector, Wide, difference, dot, plus_scaled, quotient, sum_of_products, update,
 };
-use crate::engine::constraints::vectors::system::System;
-use crate::engine::lanes::Lanes;
+use crate::constraints::vectors::system::System;
+use crate::lanes::Lanes;
 
 /// b, µ of each point in its second entries, and D.
 #[derive(Debug)]

@@ -7,17 +7,17 @@
 //! either have the same bits at every width. An entry of λ or of a relative velocity is
 //! `[normal, tangential]`, along n and t = (n_y, −n_x) on body b.
 
-use crate::engine::clock::{Clock, Phase};
-use crate::engine::constraints::kernels::pass::{PassMode, PassWidth, VectorTask, at_width};
-use crate::engine::constraints::kernels::types::{Joined, TypeInput, TypeRows};
-use crate::engine::constraints::kernels::velocity::rules::Softness;
-use crate::engine::constraints::records::batches::{Batches, Part};
-use crate::engine::constraints::records::features::{Features, Layout};
-use crate::engine::constraints::records::point_vector::PointVector;
-use crate::engine::constraints::vectors::passes::{self, VectorInput};
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{Block, BodyRow, LaneWidth};
-use crate::engine::narrowphase::lanes::PoseRow;
+use crate::clock::{Clock, Phase};
+use crate::constraints::kernels::pass::{PassMode, PassWidth, VectorTask, at_width};
+use crate::constraints::kernels::types::{Joined, TypeInput, TypeRows};
+use crate::constraints::kernels::velocity::rules::Softness;
+use crate::constraints::records::batches::{Batches, Part};
+use crate::constraints::records::features::{Features, Layout};
+use crate::constraints::records::point_vector::PointVector;
+use crate::constraints::vectors::passes::{self, VectorInput};
+use crate::contacts::Contact;
+use crate::lanes::{Block, BodyRow, LaneWidth};
+use crate::narrowphase::lanes::PoseRow;
 
 /// `[normal, tangential]` of one contact point.
 pub type Pair = [f32; 2];

@@ -30,10 +30,10 @@
 use super::input::{DescentInput, PENALTY};
 use super::joints::JointDescent;
 use super::lanes::{BodyLanes, Ends};
-use crate::engine::constraints::kernels::pass::at_width;
-use crate::engine::constraints::records::graph::Graph;
-use crate::engine::contacts::{Contact, quad};
-use crate::engine::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, Quad, held};
+use crate::constraints::kernels::pass::at_width;
+use crate::constraints::records::graph::Graph;
+use crate::contacts::{Contact, quad};
+use crate::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, Quad, held};
 
 /// Overlap that does not count as an error (m): `COLLISION_MARGIN` of the source.
 const MARGIN: f32 = 5e-4;

@@ -1,11 +1,11 @@
 //! Inputs of the passes of block descent.
 
-use crate::engine::constraints::kernels::types::Joined;
-use crate::engine::constraints::records::graph::Graph;
-use crate::engine::constraints::records::kept::Kept;
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::BodyRow;
-use crate::engine::narrowphase::lanes::PoseRow;
+use crate::constraints::kernels::types::Joined;
+use crate::constraints::records::graph::Graph;
+use crate::constraints::records::kept::Kept;
+use crate::contacts::Contact;
+use crate::lanes::BodyRow;
+use crate::narrowphase::lanes::PoseRow;
 
 /// Minimum and maximum penalty (N/m).
 pub(crate) const PENALTY: [f32; 2] = [1.0, 1e9];
@@ -15,7 +15,7 @@ pub(crate) struct DescentInput<'a> {
     pub rows: &'a mut [BodyRow],
     pub kept: &'a mut Kept,
     pub contacts: &'a [Contact],
-    /// h a of each body, see [`Motion::velocity_increments`](crate::engine::constraints::kernels::motion::Motion).
+    /// h a of each body, see [`Motion::velocity_increments`](crate::constraints::kernels::motion::Motion).
     pub increments: &'a [[f32; 4]],
     /// Number of bodies; the last row is not a body.
     pub bodies: usize,

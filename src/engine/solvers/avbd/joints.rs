@@ -23,10 +23,10 @@
 //! in the source.
 
 use super::input::{DescentInput, PENALTY};
-use crate::engine::constraints::joints::rows::{RowBlock, RowLaw};
-use crate::engine::constraints::kernels::types::{Joined, Placed};
-use crate::engine::constraints::records::rows::ROWS;
-use crate::engine::lanes::held;
+use crate::constraints::joints::rows::{RowBlock, RowLaw};
+use crate::constraints::kernels::types::{Joined, Placed};
+use crate::constraints::records::rows::ROWS;
+use crate::lanes::held;
 
 /// Numbers per row of a block.
 type JointRows = [f32; ROWS];

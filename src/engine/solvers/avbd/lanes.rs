@@ -8,9 +8,9 @@
 //! there are no colors, and bodies are solved one by one in the order in which those contacts first refer to
 //! them.
 
-use crate::engine::constraints::records::graph::Graph;
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{Indices, LaneVec, LaneWidth, held};
+use crate::constraints::records::graph::Graph;
+use crate::contacts::Contact;
+use crate::lanes::{Indices, LaneVec, LaneWidth, held};
 
 /// Bodies that are solved together.
 #[derive(Clone, Copy, Debug)]

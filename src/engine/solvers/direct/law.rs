@@ -2,11 +2,11 @@
 //! fixed states, a sweep, Lemke's method. See [`super`].
 
 use super::{PASSES, PIVOTS, SHIFT, TOLERANCE};
-use crate::engine::constraints::numerics::block_lu::{BlockLu, inverse};
-use crate::engine::constraints::numerics::coulomb_lcp::CoulombLcp;
-use crate::engine::constraints::records::rows::{RowBlock, RowLaw};
-use crate::engine::constraints::vectors::system::{Pair, PointRows};
-use crate::engine::lanes::BodyRow;
+use crate::constraints::numerics::block_lu::{BlockLu, inverse};
+use crate::constraints::numerics::coulomb_lcp::CoulombLcp;
+use crate::constraints::records::rows::{RowBlock, RowLaw};
+use crate::constraints::vectors::system::{Pair, PointRows};
+use crate::lanes::BodyRow;
 
 /// State of a row in a linear problem.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -480,7 +480,7 @@ impl IslandLaw {
     }
 
     /// The impulses of the same law by Lemke's method, see
-    /// [`crate::engine::constraints::numerics::coulomb_lcp`]. Only for islands without joints.
+    /// [`crate::constraints::numerics::coulomb_lcp`]. Only for islands without joints.
     pub fn by_lemke(&self) -> Option<Vec<f64>> {
         if !self.bounds.is_empty() {
             return None;

@@ -1,17 +1,17 @@
 //! The velocity sweep: the friction row of a contact, then its normal rows. See the [solver](super).
 
-use crate::engine::constraints::kernels::frame::{
+use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, separation, spin, to_frame, turn,
     with_arms,
 };
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::kernels::stages::{for_each_batch, over_segments};
-use crate::engine::constraints::kernels::velocity::rules::{NormalRule, Rigid};
-use crate::engine::constraints::records::batches::{Batches, Segment};
-use crate::engine::constraints::records::features::{
+use crate::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::constraints::kernels::stages::{for_each_batch, over_segments};
+use crate::constraints::kernels::velocity::rules::{NormalRule, Rigid};
+use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::lanes::{BodyRow, Lanes};
+use crate::lanes::{BodyRow, Lanes};
 
 /// One sweep. Normal rows follow the rule.
 #[derive(Clone, Copy, Debug)]

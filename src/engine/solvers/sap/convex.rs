@@ -24,13 +24,13 @@
 //! In the plane, γ of a contact is piecewise linear. If no block has the bound |γ| ≤ c, ∇ℓ is piecewise
 //! linear as well, and Newton's method ends after finitely many steps.
 
-use crate::engine::constraints::System;
-use crate::engine::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
-use crate::engine::constraints::numerics::envelope::Envelope;
-use crate::engine::constraints::records::rows::{RowBlock, RowLaw};
-use crate::engine::constraints::vectors::blocks::JointBlocks;
-use crate::engine::constraints::vectors::system::{Pair, PointRows};
-use crate::engine::lanes::BodyRow;
+use crate::constraints::System;
+use crate::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
+use crate::constraints::numerics::envelope::Envelope;
+use crate::constraints::records::rows::{RowBlock, RowLaw};
+use crate::constraints::vectors::blocks::JointBlocks;
+use crate::constraints::vectors::system::{Pair, PointRows};
+use crate::lanes::BodyRow;
 
 /// A block of three rows and columns.
 type Block3 = [[f64; 3]; 3];

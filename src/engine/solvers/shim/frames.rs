@@ -33,12 +33,12 @@
 //!
 //! The arm of a round shape is then c′ ∓ ρ n′; that of a face ends where the other one does.
 
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
-use crate::engine::contacts::{Contact, quad};
-use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
-use crate::engine::params::LINEAR_SLOP;
+use crate::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
+use crate::contacts::{Contact, quad};
+use crate::lanes::{BodyRow, LaneIndex, Lanes, Quad};
+use crate::params::LINEAR_SLOP;
 
 /// Largest change of the gap of a rolling contact (m): a fifth of the slop.
 pub(super) const STEADY: f32 = 0.2 * LINEAR_SLOP;

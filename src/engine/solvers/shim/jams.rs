@@ -48,14 +48,14 @@
 //!
 //! Velocities beyond that are scaled down in each substep before bodies move, and at its end.
 
-use crate::engine::bodies::{Bodies, BodyKind};
-use crate::engine::constraints::Passes;
-use crate::engine::constraints::kernels::types::Joined;
-use crate::engine::constraints::step::CollisionScene;
-use crate::engine::contacts::{Contact, ManifoldPoint};
-use crate::engine::disjoint::DisjointSets;
-use crate::engine::lanes::held;
-use crate::engine::narrowphase::Margins;
+use crate::bodies::{Bodies, BodyKind};
+use crate::constraints::Passes;
+use crate::constraints::kernels::types::Joined;
+use crate::constraints::step::CollisionScene;
+use crate::contacts::{Contact, ManifoldPoint};
+use crate::disjoint::DisjointSets;
+use crate::lanes::held;
+use crate::narrowphase::Margins;
 use glam::Vec2;
 
 /// Normals with a smaller product oppose each other (1). Friction holds a body in a wedge, so that impulses can grow

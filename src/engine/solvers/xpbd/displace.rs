@@ -25,19 +25,19 @@
 //!
 //! Source: `muller2020` (sections 3.5 and 3.6), `catto2024solver2d` (`solve_xpbd`: the limit of C).
 
-use crate::engine::constraints::impacts::restitution::{point, restitution_of};
-use crate::engine::constraints::kernels::frame::{
+use crate::constraints::impacts::restitution::{point, restitution_of};
+use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, spin, to_frame, turn, turned,
     with_arms,
 };
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
-use crate::engine::constraints::kernels::stages::{for_each_batch, over_segments};
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::features::{
+use crate::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
+use crate::constraints::kernels::stages::{for_each_batch, over_segments};
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::constraints::records::point_vector::places;
-use crate::engine::lanes::{Block, BodyRow, LaneIndex, Lanes, RowStore};
+use crate::constraints::records::point_vector::places;
+use crate::lanes::{Block, BodyRow, LaneIndex, Lanes, RowStore};
 
 /// Displaces bodies; see the [module](self).
 #[derive(Clone, Copy, Debug)]
@@ -141,7 +141,7 @@ struct Displaced<'a> {
 
 impl RowStore for Displaced<'_> {
     #[inline(always)]
-    fn assert_rows(&self, index: crate::engine::lanes::IndexList) {
+    fn assert_rows(&self, index: crate::lanes::IndexList) {
         self.rows.assert_rows(index);
         self.before.assert_rows(index);
     }

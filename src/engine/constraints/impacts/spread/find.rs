@@ -9,11 +9,11 @@
 //! by step if a limb is caught in another.
 
 use super::{AHEAD, BOUNCES};
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
+use crate::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
+use crate::contacts::Contact;
+use crate::lanes::{BodyRow, LaneIndex, Lanes, Quad};
 
 /// Finds contacts that are hit; see the [module](self).
 pub(crate) struct Find<'a> {

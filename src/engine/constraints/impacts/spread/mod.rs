@@ -50,9 +50,9 @@ mod law;
 mod pair;
 mod point;
 
-use crate::engine::constraints::impacts::touch::Round;
-use crate::engine::disjoint::DisjointSets;
-use crate::engine::lanes::held;
+use crate::constraints::impacts::touch::Round;
+use crate::disjoint::DisjointSets;
+use crate::lanes::held;
 pub(crate) use find::{Find, impact_speeds};
 use law::{lossy_impulses, rough_impulses};
 pub(crate) use point::SpreadInput;

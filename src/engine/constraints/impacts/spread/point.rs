@@ -2,13 +2,13 @@
 
 use super::NONE;
 use super::find::SLOW;
-use crate::engine::constraints::impacts::touch::{Round, TouchFrame, couplings, write_arms};
-use crate::engine::constraints::kernels::frame::turn;
-use crate::engine::constraints::records::batches::Batches;
-use crate::engine::constraints::records::features::{Features, Layout};
-use crate::engine::constraints::records::segment::Segment;
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, Lanes};
+use crate::constraints::impacts::touch::{Round, TouchFrame, couplings, write_arms};
+use crate::constraints::kernels::frame::turn;
+use crate::constraints::records::batches::Batches;
+use crate::constraints::records::features::{Features, Layout};
+use crate::constraints::records::segment::Segment;
+use crate::contacts::Contact;
+use crate::lanes::{BodyRow, Lanes};
 
 /// State of a body.
 #[derive(Clone, Copy, Debug)]

@@ -72,12 +72,12 @@
 pub(super) mod records;
 mod system;
 
-use crate::engine::constraints::joints::ANCHORS;
-use crate::engine::constraints::kernels::types::Joined;
-use crate::engine::constraints::kernels::velocity::masses::ScaledMasses;
-use crate::engine::constraints::records::links::{ChainLink, LinkRule};
-use crate::engine::lanes::{BodyRow, held};
-use crate::engine::narrowphase::lanes::PoseRow;
+use crate::constraints::joints::ANCHORS;
+use crate::constraints::kernels::types::Joined;
+use crate::constraints::kernels::velocity::masses::ScaledMasses;
+use crate::constraints::records::links::{ChainLink, LinkRule};
+use crate::lanes::{BodyRow, held};
+use crate::narrowphase::lanes::PoseRow;
 pub use system::ChainStage;
 use system::ChainSystem;
 

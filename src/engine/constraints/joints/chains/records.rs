@@ -1,13 +1,13 @@
 //! Links of one type of joint: their data during a step, and their rows.
 
-use crate::engine::constraints::joints::passes::{Besides, is_pair};
-use crate::engine::constraints::joints::rows::{Jacobian, JointPair, JointPass, RowLaw};
-use crate::engine::constraints::joints::{ANCHORS, JointType, Joints, placed_anchors, write_velocities};
-use crate::engine::constraints::kernels::frame::{INV_INERTIA, INV_MASS};
-use crate::engine::constraints::kernels::types::{ConstraintType, TypeInput};
-use crate::engine::constraints::records::links::{ChainLink, LINK_LANES, LinkImpulses, LinkRows, LinkRule};
-use crate::engine::lanes::{BodyRow, Indices, LaneIndex, Lanes, RowStore, held};
-use crate::engine::narrowphase::lanes::PoseRow;
+use crate::constraints::joints::passes::{Besides, is_pair};
+use crate::constraints::joints::rows::{Jacobian, JointPair, JointPass, RowLaw};
+use crate::constraints::joints::{ANCHORS, JointType, Joints, placed_anchors, write_velocities};
+use crate::constraints::kernels::frame::{INV_INERTIA, INV_MASS};
+use crate::constraints::kernels::types::{ConstraintType, TypeInput};
+use crate::constraints::records::links::{ChainLink, LINK_LANES, LinkImpulses, LinkRows, LinkRule};
+use crate::lanes::{BodyRow, Indices, LaneIndex, Lanes, RowStore, held};
+use crate::narrowphase::lanes::PoseRow;
 use std::ops::{Deref, DerefMut};
 use wide::f32x8;
 

@@ -37,10 +37,10 @@
 mod apparent;
 mod blocks;
 
-use crate::engine::constraints::joints::rows::dot;
-use crate::engine::constraints::kernels::frame::{VX, VY, W};
-use crate::engine::constraints::records::links::{LINK_LANES, LinkGroups, LinkImpulses, LinkRows};
-use crate::engine::lanes::{BodyRow, Indices, LaneIndex, Lanes, held};
+use crate::constraints::joints::rows::dot;
+use crate::constraints::kernels::frame::{VX, VY, W};
+use crate::constraints::records::links::{LINK_LANES, LinkGroups, LinkImpulses, LinkRows};
+use crate::lanes::{BodyRow, Indices, LaneIndex, Lanes, held};
 use apparent::Apparent;
 use blocks::{Factor, LaneMatrix, LaneVector, down, each, less, minus, reduce, transposed, up};
 use wide::f32x8;

@@ -5,7 +5,7 @@
 //!
 //! # Derivation
 //!
-//! A [rule](crate::engine::constraints::kernels::velocity::rules::NormalRule) gives each row the line λ =
+//! A [rule](crate::constraints::kernels::velocity::rules::NormalRule) gives each row the line λ =
 //! max(0, c − s v), where v is the normal velocity of the row. With both rows solved at once, row p also sees
 //! the change of the other row, v_p = v_p⁰ + k₁₂ (λ_q − λ_q⁰). Dividing by s > 0 gives
 //!
@@ -43,18 +43,18 @@
 //! then exact at the end of the sweep (`catto2024solver2d`, `solve_pgs_ngs_block`). Or friction rows last,
 //! bounded by the new normal impulses: the cone then holds, and sliding contacts use the current load.
 
-use crate::engine::constraints::kernels::frame::{
+use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_MASS, TURN, arms, separation, spin, to_frame, turn, with_arms,
 };
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
-use crate::engine::constraints::kernels::velocity::rules::Softness;
-use crate::engine::constraints::kernels::velocity::sweep::{NormalRule, Rows, unbounded_friction};
-use crate::engine::constraints::records::batches::{Batches, Segment};
-use crate::engine::constraints::records::features::{
+use crate::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
+use crate::constraints::kernels::velocity::rules::Softness;
+use crate::constraints::kernels::velocity::sweep::{NormalRule, Rows, unbounded_friction};
+use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::lanes::{BodyRow, Lanes};
+use crate::lanes::{BodyRow, Lanes};
 
 /// A matrix with a determinant below this fraction of a₁₁ a₂₂ is solved row by row (1).
 const SINGULAR: f32 = 1e-3;

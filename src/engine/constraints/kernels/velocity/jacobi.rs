@@ -3,18 +3,16 @@
 //!
 //! Within a contact the rows are still solved one after the other (`catto2024solver2d`, `solve_jacobi`). Sums
 //! are taken color by color, so that they have the same bits at every width; in exact arithmetic the order
-//! does not matter. The kernel is that of [`crate::engine::constraints::kernels::velocity::sweep`], with a
+//! does not matter. The kernel is that of [`crate::constraints::kernels::velocity::sweep`], with a
 //! row store that reads from one place and accumulates in another.
 
-use crate::engine::constraints::kernels::frame::{INV_MASS, VX, VY, W};
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
-use crate::engine::constraints::kernels::stages::over_segments;
-use crate::engine::constraints::kernels::velocity::rules::{NormalRule, Relaxed, Soft, Softness};
-use crate::engine::constraints::kernels::velocity::sweep::sweep_segment;
-use crate::engine::constraints::records::features::{
-    KernelFeatures, Layout, OnMoving, OnStatic, OppositeKind,
-};
-use crate::engine::lanes::{BodyRow, IndexList, LaneIndex, Lanes, RowStore};
+use crate::constraints::kernels::frame::{INV_MASS, VX, VY, W};
+use crate::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
+use crate::constraints::kernels::stages::over_segments;
+use crate::constraints::kernels::velocity::rules::{NormalRule, Relaxed, Soft, Softness};
+use crate::constraints::kernels::velocity::sweep::sweep_segment;
+use crate::constraints::records::features::{KernelFeatures, Layout, OnMoving, OnStatic, OppositeKind};
+use crate::lanes::{BodyRow, IndexList, LaneIndex, Lanes, RowStore};
 
 /// A Jacobi sweep under the soft rule, which is the rigid rule if it has no springs.
 #[derive(Debug)]

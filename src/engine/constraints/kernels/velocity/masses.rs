@@ -4,14 +4,14 @@
 //! contact as immovable. Both scale the inverse masses in the rows, and the effective masses 1/k in the
 //! records must follow, with k = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (r_a × u)² + I_b⁻¹ (r_b × u)².
 
-use crate::engine::constraints::kernels::frame::{BodyPair, INV_INERTIA, INV_MASS, arms};
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
-use crate::engine::constraints::kernels::stages::{for_each_batch, over_segments};
-use crate::engine::constraints::records::batches::{Batches, Segment};
-use crate::engine::constraints::records::features::{
+use crate::constraints::kernels::frame::{BodyPair, INV_INERTIA, INV_MASS, arms};
+use crate::constraints::kernels::pass::{Pass, PassInput, PassMode, PerLane};
+use crate::constraints::kernels::stages::{for_each_batch, over_segments};
+use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, held};
+use crate::lanes::{BodyRow, LaneIndex, Lanes, held};
 
 /// Inverse masses and inertias of bodies while they are scaled.
 #[derive(Clone, Debug, Default)]

@@ -3,7 +3,7 @@
 //! Each point stores its drift d along the surface since it began to stick (m). Its friction row aims at v_t
 //! = −β_t d/h, which brings a creeping point back. If this exceeds the cone, the point slides and begins to
 //! stick again at its current position. Normal rows are those of
-//! [`crate::engine::constraints::kernels::velocity::rules::Baumgarte`] without slop. The cone of each point
+//! [`crate::constraints::kernels::velocity::rules::Baumgarte`] without slop. The cone of each point
 //! uses its share of the manifold's normal impulse, Σ λn/points, so a load that shifts from point to point
 //! unsticks neither.
 //!
@@ -17,7 +17,7 @@
 //!
 //! Drifts follow contacts from step to step in [`Kept`]. Within a step they are in lane order, in the
 //! tangential entries of a vector laid out as a
-//! [`crate::engine::constraints::records::point_vector::PointVector`], so a sweep reads and writes them
+//! [`crate::constraints::records::point_vector::PointVector`], so a sweep reads and writes them
 //! without gathering.
 //!
 //! Source: `catto2024solver2d` (`solve_tgs_sticky`).
@@ -29,19 +29,19 @@
 //! step. A flag per point marks sliding contacts, in the normal entry of the vector. A point that has a gap
 //! at the start of the step uses the rate 1/h of gaps for the whole step.
 
-use crate::engine::constraints::kernels::frame::{
+use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W, apply, arms, spin, to_frame, turn, with_arms,
 };
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::kernels::stages::over_segments;
-use crate::engine::constraints::kernels::velocity::rules::Softness;
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::features::{
+use crate::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::constraints::kernels::stages::over_segments;
+use crate::constraints::kernels::velocity::rules::Softness;
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::features::{
     KernelFeatures, Layout, LayoutOf, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::constraints::records::kept::Kept;
-use crate::engine::constraints::records::point_vector::places;
-use crate::engine::lanes::{Block, BodyRow, Lanes, RowStore};
+use crate::constraints::records::kept::Kept;
+use crate::constraints::records::point_vector::places;
+use crate::lanes::{Block, BodyRow, Lanes, RowStore};
 
 /// Parameters of a sweep; see the [module](self). The solver keeps one float per contact point.
 #[derive(Clone, Copy, Debug)]

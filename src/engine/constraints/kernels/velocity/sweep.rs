@@ -1,5 +1,5 @@
 //! The contact sweep: one source for every width, feature set and solver. Bodies and rows are as in
-//! [`crate::engine::constraints::kernels::frame`].
+//! [`crate::constraints::kernels::frame`].
 //!
 //! # Coupling
 //!
@@ -31,7 +31,7 @@
 //! with 32 registers. Of these, 39 store to the stack instead of 8, 28 load from it instead of 3, and 30 have
 //! an operand in it instead of 6; the 72 shuffles and some 120 arithmetic instructions are the same. On the
 //! same core this takes 11 % longer, soft contacts 15 %. An unlucky placement of the stack cost more than
-//! that (`align_frame`). The remedy is [`crate::engine::constraints::kernels::stages`].
+//! that (`align_frame`). The remedy is [`crate::constraints::kernels::stages`].
 //!
 //! Tried without gain, before stages: storing the coupling k in the record (53 instructions fewer; −5 and
 //! −3 %, preparing +18 %); friction rows that wait for the spins (41 fewer; −3 and −2 %); rereading records
@@ -52,17 +52,17 @@
 //! Sources: `catto2006` (sequential impulses, accumulated clamping), `catto2024simd` (gather, solve, scatter
 //! by color); the contact frame is this crate's own.
 
-use crate::engine::constraints::kernels::frame::{
+use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, TURN, arms, separation, spin, to_frame, turn, turned, with_arms,
 };
-use crate::engine::constraints::kernels::pass::{AnyPass, Pass, PassInput, PerLane};
-use crate::engine::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
-use crate::engine::constraints::kernels::velocity::rules::Softness;
-use crate::engine::constraints::records::batches::{Batches, Segment};
-use crate::engine::constraints::records::features::{
+use crate::constraints::kernels::pass::{AnyPass, Pass, PassInput, PerLane};
+use crate::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
+use crate::constraints::kernels::velocity::rules::Softness;
+use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::lanes::{BodyRow, Lanes, RowStore};
+use crate::lanes::{BodyRow, Lanes, RowStore};
 
 /// A rule for the new accumulated impulse of a normal row.
 ///
@@ -90,7 +90,7 @@ pub trait NormalRule: Copy + Send + Sync + 'static {
     fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2];
 
     /// As [`Self::line`] between two moving bodies. The weight measures how unequal their masses are, from 0
-    /// to 1; see [`Between`](crate::engine::constraints::kernels::velocity::rules::Between).
+    /// to 1; see [`Between`](crate::constraints::kernels::velocity::rules::Between).
     #[inline(always)]
     fn line_by_mass<L: Lanes>(&self, _weight: L, separation: L, mass: L, old: L) -> [L; 2] {
         self.line(false, separation, mass, old)

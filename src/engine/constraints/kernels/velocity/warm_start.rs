@@ -1,15 +1,13 @@
 //! The warm start: the impulses of the previous step serve as the initial guess of this one.
 
-use crate::engine::constraints::kernels::frame::{
-    BodyPair, INV_INERTIA, TURN, W, apply, arms, spin, turn, turned,
-};
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::kernels::stages::{for_each_batch, over_segments};
-use crate::engine::constraints::records::batches::{Batches, Segment};
-use crate::engine::constraints::records::features::{
+use crate::constraints::kernels::frame::{BodyPair, INV_INERTIA, TURN, W, apply, arms, spin, turn, turned};
+use crate::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::constraints::kernels::stages::{for_each_batch, over_segments};
+use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
 };
-use crate::engine::lanes::{BodyRow, Lanes};
+use crate::lanes::{BodyRow, Lanes};
 
 /// The warm start: applies the accumulated impulses, with the arms at the start of the step or with arms that
 /// turn with their bodies.

@@ -19,11 +19,11 @@
 //! The part of the impulses for which springs are not shortened is the part that statics does not explain.
 
 use super::{JOINED, OPEN};
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
-use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
-use crate::engine::params::LINEAR_SLOP;
+use crate::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
+use crate::lanes::{BodyRow, LaneIndex, Lanes, Quad};
+use crate::params::LINEAR_SLOP;
 
 /// Greatest gap of a closed point (m).
 const CLOSED: f32 = 0.02 * LINEAR_SLOP;

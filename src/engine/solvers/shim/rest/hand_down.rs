@@ -10,11 +10,11 @@
 //! contacts of such bodies.
 
 use super::{OPEN, PER_CONTACT};
-use crate::engine::bodies::{Bodies, BodyKind};
-use crate::engine::constraints::numerics::supports::{self, Support};
-use crate::engine::constraints::records::graph::{Graph, UNSUPPORTED};
-use crate::engine::contacts::Contact;
-use crate::engine::lanes::{BodyRow, held};
+use crate::bodies::{Bodies, BodyKind};
+use crate::constraints::numerics::supports::{self, Support};
+use crate::constraints::records::graph::{Graph, UNSUPPORTED};
+use crate::contacts::Contact;
+use crate::lanes::{BodyRow, held};
 use glam::{DVec2, Vec2};
 
 /// Smallest cosine between gravity and the normals of contacts that hand loads down.

@@ -7,10 +7,10 @@
 //! ```
 
 use super::closed::{arms_of, push, store};
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
-use crate::engine::lanes::{BodyRow, LaneIndex, Lanes, Quad};
+use crate::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
+use crate::lanes::{BodyRow, LaneIndex, Lanes, Quad};
 
 /// See the [module](self).
 pub(in super::super) struct LoadSweep<'a> {

@@ -3,7 +3,7 @@
 //! # The problem
 //!
 //! A spring carries a load by deflecting. At rest a soft row of impulse λ per substep has, with the terms of
-//! [`crate::engine::constraints::kernels::velocity::rules::Soft`], γ_i λ = −m γ_m β s, so it sags by
+//! [`crate::constraints::kernels::velocity::rules::Soft`], γ_i λ = −m γ_m β s, so it sags by
 //!
 //! ```text
 //! sag(λ) = γ_i λ / (γ_m β m)
@@ -40,10 +40,10 @@ pub(super) mod loads;
 pub(super) mod shorten;
 
 use super::{Shim, part};
-use crate::engine::constraints::kernels::velocity::rules::Soft;
-use crate::engine::constraints::step::StepParts;
-use crate::engine::constraints::{Passes, Workspace};
-use crate::engine::lanes::BodyRow;
+use crate::constraints::kernels::velocity::rules::Soft;
+use crate::constraints::step::StepParts;
+use crate::constraints::{Passes, Workspace};
+use crate::lanes::BodyRow;
 
 /// Numbers kept per contact, two quads: N and T of both points (N), −1 and 0 for a point that is open; how long the contact has been
 /// calm (s); the largest preload per effective mass (m/s²); and the load that springs of each point are shortened for (N), −1 for a contact that is calm.

@@ -64,11 +64,11 @@
 //! shortened for its load once, when it is calm for the first time. After that its preload only falls.
 
 use super::closed::{CALM_TIME, NEARLY};
-use crate::engine::constraints::kernels::pass::{Pass, PassInput, PerLane};
-use crate::engine::constraints::kernels::velocity::rules::{Soft, Softness};
-use crate::engine::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::engine::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
-use crate::engine::lanes::{LaneIndex, Lanes, Quad, prefetch_quad};
+use crate::constraints::kernels::pass::{Pass, PassInput, PerLane};
+use crate::constraints::kernels::velocity::rules::{Soft, Softness};
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
+use crate::lanes::{LaneIndex, Lanes, Quad, prefetch_quad};
 
 /// See the [module](self).
 #[derive(Clone, Copy, Debug)]

@@ -35,8 +35,8 @@
 //! ends.
 
 use super::{ChainSystem, GIVE, up, velocity_of};
-use crate::engine::constraints::records::links::LINK_LANES;
-use crate::engine::lanes::{BodyRow, Lanes, held};
+use crate::constraints::records::links::LINK_LANES;
+use crate::lanes::{BodyRow, Lanes, held};
 use glam::{DMat3, DVec3};
 use std::ops::Range;
 use wide::f32x8;

@@ -1,6 +1,6 @@
 //! Blocks of a system in lanes: a small matrix or vector per lane.
 
-use crate::engine::constraints::records::links::LINK_LANES;
+use crate::constraints::records::links::LINK_LANES;
 use wide::f32x8;
 
 /// One vector per lane.

@@ -1,8 +1,8 @@
 //! Rigid contacts with Baumgarte stabilization.
 
 use super::{Relaxed, Rule, Softness};
-use crate::engine::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
-use crate::engine::lanes::Lanes;
+use crate::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
+use crate::lanes::Lanes;
 
 /// λ ← max(0, λ − m_eff (v_n + b)), with the bias velocity of `baumgarte1972`:
 ///

@@ -1,6 +1,6 @@
 //! Rules of normal rows shared by several solvers, each with its derivation; [`Rule`] is any of them.
 //!
-//! Many solvers differ only in their rule; the [sweep](crate::engine::constraints::kernels::velocity::sweep)
+//! Many solvers differ only in their rule; the [sweep](crate::constraints::kernels::velocity::sweep)
 //! around it is shared. A solver can define its own rule by implementing [`NormalRule`].
 
 mod baumgarte;
@@ -9,14 +9,14 @@ mod soft;
 mod touching;
 mod variations;
 
-pub use crate::engine::constraints::kernels::velocity::sweep::NormalRule;
+pub use crate::constraints::kernels::velocity::sweep::NormalRule;
 pub use baumgarte::Baumgarte;
 pub use rigid::Rigid;
 pub use soft::{Bearing, Soft, Softness, angular_frequencies};
 pub use touching::Touching;
 pub use variations::{Between, Frictionless, Relaxed, Turned};
 
-use crate::engine::constraints::kernels::velocity::sweep::{Sweep, VelocitySweep};
+use crate::constraints::kernels::velocity::sweep::{Sweep, VelocitySweep};
 
 /// A rule as a value.
 #[derive(Clone, Copy, Debug, PartialEq)]

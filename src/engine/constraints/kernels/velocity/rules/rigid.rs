@@ -1,8 +1,8 @@
 //! Rigid contacts: no approach velocity, no position feedback.
 
 use super::Rule;
-use crate::engine::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
-use crate::engine::lanes::Lanes;
+use crate::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
+use crate::lanes::Lanes;
 
 /// λ ← max(0, λ − m_eff (v_n + max(s, 0)/h)): gaps may just close; overlap is not corrected.
 #[derive(Clone, Copy, Debug, PartialEq)]

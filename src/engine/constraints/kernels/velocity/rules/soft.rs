@@ -1,8 +1,8 @@
 //! Soft contacts: implicitly integrated springs.
 
 use super::{Frictionless, Rule, Turned};
-use crate::engine::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
-use crate::engine::lanes::Lanes;
+use crate::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
+use crate::lanes::Lanes;
 use std::f32::consts::TAU;
 
 /// The coefficients of a spring of angular frequency ω and damping ratio ζ, integrated

@@ -1,8 +1,8 @@
 //! Rigid contacts at touching points only.
 
 use super::Rule;
-use crate::engine::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
-use crate::engine::lanes::Lanes;
+use crate::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
+use crate::lanes::Lanes;
 
 /// λ ← max(0, λ − m_eff v_n) at touching points, s < slop; other points keep their impulse. No friction.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! Rules built from other rules.
 
 use super::{NormalRule, Softness};
-use crate::engine::lanes::Lanes;
+use crate::lanes::Lanes;
 
 /// Another rule without friction rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
