@@ -2,6 +2,7 @@
 
 use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
+use crate::engine::narrowphase::frozen::{FreezeLimits, Freezing};
 use crate::engine::params::{Budget, Parameters, Without};
 use crate::engine::solvers::{DEFAULT, VARIANTS, Variant, find};
 use crate::engine::world::{Order, Settings};
@@ -10,6 +11,7 @@ use crate::lab::files;
 use crate::lab::overrides::{self, Override};
 use crate::lab::scenes::CATALOG;
 use crate::lab::study::{self, DEFAULT_SCENES, DEFAULT_SOLVERS, budget, default_solvers};
+use crate::lab::units::quantity;
 use clap::Args;
 use clap::builder::{
     NonEmptyStringValueParser, OsStringValueParser, PossibleValue, PossibleValuesParser, TypedValueParser,
@@ -143,6 +145,39 @@ pub struct ImpactArgs {
     pub impacts: Impacts,
 }
 
+/// `--frozen` of commands that take one choice.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct FrozenArgs {
+    /// Contacts that keep their normal and lever arms while bodies hardly move: own is the solver's choice, off is
+    /// never, DISTANCE,TURN within such a motion (1mm,0.01: meters and radians), and DISTANCE,TURN,loaded only where
+    /// both points of a contact bear load
+    #[arg(long, default_value = "own", value_name = "LIMITS", value_parser = frozen)]
+    pub frozen: Freezing,
+}
+
+/// The parser of `--frozen`. Errors: a word that is none of them, a distance or turn that is not positive.
+fn frozen(text: &str) -> Result<Freezing, Error> {
+    let refused = |why: &str| Error::invalid("frozen", format!("'{text}' {why}"));
+    let positive = |what: &str, text: &str, unit: &str| {
+        let value = quantity("frozen", text, unit)?;
+        if value > 0.0 {
+            Ok(value as f32)
+        } else {
+            Err(refused(&format!("has a {what} that is not positive")))
+        }
+    };
+    match text.split(',').collect::<Vec<_>>()[..] {
+        ["own"] => Ok(Freezing::Own),
+        ["off"] => Ok(Freezing::Off),
+        [distance, turn] | [distance, turn, "loaded"] => Ok(Freezing::Within(FreezeLimits {
+            distance: positive("distance", distance, "m")?,
+            turn: positive("turn", turn, "rad")?,
+            loaded_only: text.ends_with(",loaded"),
+        })),
+        _ => Err(refused("is none of own, off, DISTANCE,TURN and DISTANCE,TURN,loaded")),
+    }
+}
+
 /// `--without` of commands that run a solver.
 #[derive(Args, Clone, Debug, Default)]
 pub struct WithoutArgs {
@@ -193,6 +228,9 @@ pub struct SettingArgs {
     /// Impacts
     #[command(flatten)]
     pub impacts: ImpactArgs,
+    /// Frozen contacts
+    #[command(flatten)]
+    pub frozen: FrozenArgs,
     /// Mechanisms
     #[command(flatten)]
     pub without: WithoutArgs,
@@ -210,6 +248,7 @@ impl SettingArgs {
             position_iterations: none,
             set: Vec::new(),
             impacts: ImpactArgs::default(),
+            frozen: FrozenArgs::default(),
             without: WithoutArgs::default(),
         })
     }
@@ -219,7 +258,8 @@ impl SettingArgs {
     pub fn settings(&self) -> Result<Settings, Error> {
         let (budget, parameters) = (self.budget()?, self.parameters()?);
         let (impacts, without) = (self.impacts.impacts, self.without.of(self.solver)?);
-        Ok(Settings { budget, parameters, impacts, without, ..Settings::new(self.solver) })
+        let frozen = self.frozen.frozen;
+        Ok(Settings { budget, parameters, impacts, frozen, without, ..Settings::new(self.solver) })
     }
 
     /// The budget. Errors: one that the solver cannot run with; sweeps of a kind that it does not have.

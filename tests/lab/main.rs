@@ -19,7 +19,6 @@ mod papers;
 mod piles;
 mod plastic;
 mod profile;
-mod recycling;
 mod rest;
 mod rivals;
 mod saved;

@@ -22,6 +22,7 @@ pub mod circles;
 pub mod clip;
 #[doc(hidden)]
 pub mod epa;
+pub mod frozen;
 pub mod gjk;
 #[doc(hidden)]
 pub mod hull;

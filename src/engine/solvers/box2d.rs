@@ -15,8 +15,6 @@
 //! **Fails when** [`super::soft_step`] does. Sliding and sticking are less accurate: in each substep friction
 //! is solved only once, on top of the normal velocities that the springs left.
 
-mod recycle;
-
 use super::{Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
@@ -36,48 +34,13 @@ pub static SOLVER: Variant = Variant {
     budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 1, position_iterations: 0 },
     uses: Uses { velocity: true, relax: true, position: false },
     iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..standard },
-    parameters: &[
-        Parameter::CONTACT_HERTZ,
-        Parameter::PUSH_SPEED,
-        Parameter {
-            name: "recycle_distance",
-            unit: "m",
-            default: 10.0 * LINEAR_SLOP,
-            range: [0.0, 1.0],
-            meaning: "relative motion within which two bodies keep their manifold; 0: manifolds are never kept",
-            trials: &[],
-        },
-    ],
+    parameters: &[Parameter::CONTACT_HERTZ, Parameter::PUSH_SPEED],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
     impacts: ImpactLaw::BOX2D,
-    make: Variant::made_by(|| Box::new(Box2d::default())),
+    frozen: Some(FreezeLimits::BOX2D),
+    make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
-
-/// State from step to step.
-#[derive(Clone, Debug, Default)]
-struct Box2d {
-    recycled: Recycled,
-}
-
-impl Solver for Box2d {
-    fn before_collision(&mut self, scene: &mut CollisionScene<'_>, collision: &mut Collision) {
-        let distance = scene.parameters[RECYCLE_DISTANCE];
-        self.recycled.update(scene.candidates, scene.contacts, distance, &mut collision.keep);
-    }
-
-    fn after_collision(&mut self, scene: &mut CollisionScene<'_>) {
-        self.recycled.take_up(scene.candidates, scene.contacts);
-    }
-
-    fn step(&mut self, passes: &mut Passes<'_>) {
-        step(passes);
-    }
-
-    fn boxed(&self) -> Box<dyn Solver> {
-        Box::new(self.clone())
-    }
-}
 
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());

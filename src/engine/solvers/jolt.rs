@@ -3,7 +3,8 @@
 //!
 //! **Source.** `rouwe2026jolt`: `PhysicsSettings.h` (10 velocity iterations, 2 position iterations, Baumgarte
 //! 0.2, slop 2 cm, look-ahead 2 cm, rebounds above 1 m/s), `ContactConstraintManager.cpp` (rows and their
-//! order).
+//! order). The friction row per contact is that of commit 0f58921e (pull request 2039), which came after version 5.5;
+//! up to 5.5 each point has friction rows of its own.
 //!
 //! **Departures.** Impulses are matched by feature id from step to step; the source looks for a point within
 //! 1 cm. Friction is stored in equal parts on the points of a contact, so its arm in the warm start moves

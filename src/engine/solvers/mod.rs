@@ -223,6 +223,7 @@ impl Variant {
         mechanisms: &[],
         softness: None,
         impacts: ImpactLaw::Bias,
+        frozen: None,
         continuous: false,
         kept: KeptSize::NONE,
         holds_no_joints: None,

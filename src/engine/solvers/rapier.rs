@@ -8,7 +8,7 @@
 //! **Departures.** The contact frequency is clamped to an eighth of the substep rate, which rapier leaves to
 //! its user; at its standard 4 substeps both have 30 Hz. Pairs with a determinant below a thousandth of the
 //! product of their diagonal are solved row by row; rapier's threshold is a hundredth. Restitution is this
-//! crate's. Contacts are solved in the order of this crate's colors.
+//! crate's. Contacts of discs are not [frozen](crate::narrowphase::frozen). Contacts are solved in the order of this crate's colors.
 //!
 //! **Agreement.** Within 6e-5 of its source's method in `f64` (`tests/lab/agree`).
 //!
@@ -34,6 +34,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[Parameter::CONTACT_HERTZ, Parameter::PUSH_SPEED],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
     impacts: ImpactLaw::RAPIER,
+    frozen: Some(FreezeLimits::BOX2D),
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -6,12 +6,10 @@
 //! a contact, exact line search (Drake's SAP solver). `todorov2014` (MuJoCo) solves the same problem with
 //! elliptic cones. `anitescu2006` (the relaxation).
 //!
-//! **Departures.** The compliance of a contact is `softness` times its effective inverse mass, along n
-//! and t alike. For nearly rigid contacts, SAP uses 0.025 along n and 0.001 along t; MuJoCo's default is
-//! about 0.1. Overlap is pushed apart as in [`super::pgs`], but without a slop, within which soft
-//! contacts would sink from step to step. Newton's method starts from the velocities after warm starting
-//! instead of those of the last step, so that momentum is conserved even if the method ends early.
-//! Factors are within an envelope (`numerics/envelope.rs`), which has no fill ordering of its own. If a
+//! **Departures.** The compliance of a contact is `softness` times its effective inverse mass along n, and
+//! `tangent_softness` times along t, both 10⁻⁵ by default. For nearly rigid contacts, SAP uses 0.025 and 0.001;
+//! MuJoCo's default is about 0.1. Overlap is pushed apart as in [`super::pgs`], but without a slop, within which soft
+//! contacts would sink from step to step. Factors are within an envelope (`numerics/envelope.rs`), which has no fill ordering of its own. If a
 //! factorization would take more than `factor_work`, conjugate gradients with a block-diagonal
 //! preconditioner find the step, as in MuJoCo's second solver. The relative compliance of rigid joint
 //! rows is 10⁻⁸; that of springs follows from their law. Motors and capped springs have the nearest
@@ -19,7 +17,7 @@
 //!
 //! **Agreement.** Within 6e-5 of the solution in `f64` (`tests/lab/agree`).
 //!
-//! **Cost.** Per substep 2 body passes, 1 warm start and up to `velocity_iterations` Newton steps, each a factorization in `f64`, one
+//! **Cost.** Per substep 2 body passes and up to `velocity_iterations` Newton steps, each a factorization in `f64`, one
 //! lane: 9 n b² operations for n bodies in a band of b bodies. A step in which nothing changes state takes one or two.
 //!
 //! **Fails when** bodies slide: the relaxation separates the surfaces at µ times the sliding speed. When
@@ -57,6 +55,14 @@ pub static SOLVER: Variant = Variant {
             trials: &[1e-6, 1e-4, 1e-3],
         },
         Parameter {
+            name: "tangent_softness",
+            unit: "",
+            default: 1e-5,
+            range: [1e-9, 1e3],
+            meaning: "the same along the surface; the source has 0.001, and softness 0.025",
+            trials: &[],
+        },
+        Parameter {
             name: "factor_work",
             unit: "10⁶",
             default: 1000.0,
@@ -77,13 +83,19 @@ pub static SOLVER: Variant = Variant {
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
     let rule = Baumgarte::new(passes.parameter(0), 0.0, passes.push_speed(), h);
-    let [softness, millions] = [1, 2].map(|i| f64::from(passes.parameter(i)));
+    let [softness, tangent_softness, millions] = [1, 2, 3].map(|i| f64::from(passes.parameter(i)));
+    let softness = [softness, tangent_softness];
+    let mut last = Vec::new();
     for substep in 0..budget.substeps {
+        // Newton's method starts from the velocities of the last step.
+        passes.with_system(Phase::Solve, |system| {
+            last.clear();
+            last.extend(system.rows().iter().map(|row| [0, 1, 2].map(|k| row.velocity[k])));
+        });
         passes.integrate_velocities();
         let mut problem = passes
             .with_system(Phase::Solve, |system| Convex::new(system, &rule, softness, h, 1e6 * millions));
-        passes.warm_start();
-        passes.with_system(Phase::Solve, |system| problem.begin(system.rows()));
+        passes.with_system(Phase::Solve, |_| problem.begin(&last));
         for k in 0..budget.velocity_iterations {
             let steps = passes.with_system(Phase::Solve, |_| problem.step());
             if steps {

@@ -28,6 +28,9 @@ pub(super) struct Narrow {
     pub jobs_are_current: bool,
     /// The solver's requests to the collision phase.
     asked: Collision,
+    frozen: FrozenContacts,
+    /// Farthest point of each body from its center, 0 if it is static (m); only filled if contacts are frozen.
+    extents: Vec<f32>,
     poses: Vec<PoseRow>,
     ways: Vec<Quad>,
     jobs: [Jobs; PairKind::ALL.len()],
@@ -83,12 +86,23 @@ impl World {
         narrow.ways.extend((0..bodies.len()).map(|i| {
             Quad([dt * bodies.velocity_x[i], dt * bodies.velocity_y[i], dt * bodies.angular_velocity[i], 0.0])
         }));
-        let mut asked = std::mem::take(&mut self.narrow.asked);
-        asked.keep.clear();
-        asked.rolling = None;
+        let mut asked = Collision::default();
         self.with_scene(|solver, scene| solver.before_collision(scene, &mut asked));
         let narrow = &mut self.narrow;
         narrow.asked = asked;
+        let limits = self.settings.freezing();
+        narrow.extents.clear();
+        if limits.is_some() {
+            narrow.extents.resize(self.bodies.len(), 0.0);
+            for (surface, &body) in self.surfaces.iter().zip(&self.shape_body) {
+                let extent = &mut narrow.extents[body as usize];
+                let moves = self.bodies.kind[body as usize] != BodyKind::Static;
+                *extent = if moves { extent.max(surface.reach) } else { 0.0 };
+            }
+        }
+        let Narrow { candidates, of_kind, poses, frozen, extents, .. } = narrow;
+        frozen.update(Candidates { all: candidates, of_kind, poses }, &mut self.contacts, limits, extents);
+        let narrow = &mut self.narrow;
         let mut points = narrow.list_jobs(&self.contacts);
 
         let Narrow { candidates, jobs, fresh, is_changed, poses, ways, shapes, asked, .. } = narrow;
@@ -114,6 +128,9 @@ impl World {
             narrow.sort_contacts(&mut self.contacts);
         }
         narrow.count = self.contacts.len();
+        let Narrow { candidates, of_kind, poses, frozen, .. } = narrow;
+        frozen.note(Candidates { all: candidates, of_kind, poses }, &mut self.contacts);
+        let narrow = &self.narrow;
         let kept = &mut self.work.kept;
         kept.follow(self.solver_is.kept, &self.contacts, self.bodies.len(), narrow.is_changed);
         self.with_scene(|solver, scene| solver.after_collision(scene));
@@ -192,10 +209,10 @@ impl Narrow {
     /// are read. If most touch, the lists of the last step are reused.
     fn list_jobs(&mut self, contacts: &[Contact]) -> usize {
         let cull = 4 * contacts.len() < 3 * self.candidates.len();
-        if !self.asked.keep.is_empty() {
+        if !self.frozen.keep().is_empty() {
             self.jobs_are_current = false;
             self.list::<true>(cull);
-            let kept = self.asked.keep.iter().zip(&self.candidates).filter(|(keep, _)| **keep);
+            let kept = self.frozen.keep().iter().zip(&self.candidates).filter(|(keep, _)| **keep);
             return kept.map(|(_, c)| contacts[c.contact as usize].manifold.count as usize).sum();
         }
         if !self.jobs_are_current || cull {
@@ -207,7 +224,7 @@ impl Narrow {
 
     /// Fills the job lists; `KEEPS`: some manifolds may be kept.
     fn list<const KEEPS: bool>(&mut self, cull: bool) {
-        let keep = &self.asked.keep;
+        let keep = self.frozen.keep();
         for (jobs, names) in self.jobs.iter_mut().zip(&self.of_kind) {
             jobs.list(names, |name| {
                 let candidate = &mut self.candidates[name as usize];

@@ -39,6 +39,8 @@ struct SavedSettings {
     #[serde(default)]
     without: Vec<String>,
     impacts: Impacts,
+    #[serde(default)]
+    frozen: Freezing,
     record_impulses: bool,
     contact_events: bool,
     observe_rule: bool,
@@ -68,6 +70,7 @@ impl Serialize for Settings {
                 names.filter(|(i, _)| s.without.leaves_out(*i)).map(|(_, m)| m.name.into()).collect()
             },
             impacts: s.impacts,
+            frozen: s.frozen,
             record_impulses: s.record_impulses,
             contact_events: s.contact_events,
             observe_rule: s.observe_rule,
@@ -110,6 +113,7 @@ impl<'de> Deserialize<'de> for Settings {
             length_unit: s.length_unit,
             parameters: s.parameters,
             impacts: s.impacts,
+            frozen: s.frozen,
             record_impulses: s.record_impulses,
             contact_events: s.contact_events,
             observe_rule: s.observe_rule,

@@ -123,6 +123,7 @@ impl Settings {
             parameters: solver.defaults(),
             without: Without::default(),
             impacts: Impacts::Own,
+            frozen: Freezing::Own,
             record_impulses: false,
             contact_events: false,
             observe_rule: false,
@@ -143,6 +144,12 @@ impl Settings {
     /// The impact law of a step.
     pub fn impact_law(&self) -> ImpactLaw {
         self.impacts.law(self.solver.impacts)
+    }
+
+    /// Limits within which contacts are frozen (m, rad); `None` if they are not.
+    pub(crate) fn freezing(&self) -> Option<FreezeLimits> {
+        let limits = self.frozen.limits(self.solver.frozen)?;
+        Some(FreezeLimits { distance: limits.distance * self.length_unit, ..limits })
     }
 
     /// The solver's parameters, with those in m and m/s multiplied by the length unit.

@@ -83,8 +83,6 @@ impl CollisionScene<'_> {
 /// A solver's requests for the next collision phase.
 #[derive(Clone, Debug, Default)]
 pub struct Collision {
-    /// For each candidate, whether its manifold is left as it is. Empty if all are recomputed.
-    pub keep: Vec<bool>,
     /// Which contacts roll. `None` if no radii of curvature are needed ([`Contact::radii`]).
     pub rolling: Option<Rolling>,
 }

@@ -9,7 +9,7 @@
 //! R = diag(R_n, R_t), s = sign(e_t) and w = (1, µ s),
 //!
 //! ```text
-//! sticks  |y_t| < µ y_n                 γ = y                              G = R⁻¹
+//! sticks  |y_t| ≤ µ y_n, y_n ≥ 0        γ = y                              G = R⁻¹
 //! slides  e_n + µ |e_t| > 0 otherwise   γ = w (w·e)/(R_n + µ² R_t)         G = w wᵀ/(R_n + µ² R_t)
 //! open    else                          γ = 0                              G = 0
 //! ```
@@ -157,7 +157,9 @@ impl ConvexBlock {
                 }
             }
             ImpulseBound::Cone(friction) => {
-                if y[0] > 0.0 && y[1].abs() < friction * y[0] {
+                // The edge sticks, and so does y = 0: contacts of a stack at rest are then all in the first
+                // factorization. As open ones they would close one level per step.
+                if y[0] >= 0.0 && y[1].abs() <= friction * y[0] {
                     return sticks;
                 }
                 let w = [1.0, friction.copysign(e[1]), 0.0];
@@ -242,8 +244,14 @@ impl ConvexBlock {
 
 impl Convex {
     /// The problem of a step, in which the bodies have the velocities v* now. `softness` is R ÷ J M⁻¹ Jᵀ
-    /// of contacts. Factorizations take at most `most_work` multiplications.
-    pub fn new(system: &mut System<'_>, rule: &Baumgarte, softness: f64, h: f32, most_work: f64) -> Self {
+    /// of contacts along n and t. Factorizations take at most `most_work` multiplications.
+    pub fn new(
+        system: &mut System<'_>,
+        rule: &Baumgarte,
+        softness: [f64; 2],
+        h: f32,
+        most_work: f64,
+    ) -> Self {
         let mut problem = Convex { most_work, ..Convex::default() };
         let mut numbers = Vec::new();
         for (row, body) in system.rows().iter().enumerate() {
@@ -282,7 +290,7 @@ impl Convex {
             });
             // A row that moves no body has no impulse.
             for (r, k) in response.into_iter().enumerate() {
-                block.softness[r][r] = if k > 0.0 { softness * k } else { f64::MAX.sqrt() };
+                block.softness[r][r] = if k > 0.0 { softness[r] * k } else { f64::MAX.sqrt() };
                 block.inverse[r][r] = 1.0 / block.softness[r][r];
             }
             problem.places.push(point.at);
@@ -373,10 +381,9 @@ impl Convex {
         block
     }
 
-    /// Starts from the current velocities of the bodies.
-    pub fn begin(&mut self, rows: &[BodyRow]) {
-        let velocity = |body: &MovingBody| [0, 1, 2].map(|k| f64::from(rows[body.row].velocity[k]));
-        self.velocities = self.bodies.iter().map(velocity).collect();
+    /// Starts from these velocities of all rows.
+    pub fn begin(&mut self, velocities: &[[f32; 3]]) {
+        self.velocities = self.bodies.iter().map(|body| velocities[body.row].map(f64::from)).collect();
         self.gradient = vec![[0.0; 3]; self.bodies.len()];
         self.direction.clone_from(&self.gradient);
         self.change = vec![[0.0; 3]; self.blocks.len()];
@@ -404,7 +411,8 @@ impl Convex {
             }
         }
         let scale = f64::max(momentum, pushed);
-        self.residual = if scale > 0.0 { (square / scale).sqrt() } else { 0.0 };
+        // At rest without impulses there is nothing to compare with: such a start is solved only if it is exact.
+        self.residual = if square > 0.0 { (square / scale).sqrt() } else { 0.0 };
         self.is_solved |= self.residual <= TOLERANCE;
     }
 
