@@ -3,9 +3,8 @@
 //! **Source.** `catto2024box2d` (version 3.2); the rows are those of [`super::soft_step`].
 //!
 //! **Departures.** Restitution is this crate's ([`crate::constraints::impacts::restitution`]), which
-//! conserves energy; Box2D returns e times the approach speed. Manifolds of bodies that hardly moved are kept
-//! as in Box2D, except those of discs (`box2d/recycle.rs`). Contacts are solved in the order of this crate's
-//! colors.
+//! conserves energy; Box2D returns e times the approach speed. Contacts of discs are not
+//! [frozen](crate::narrowphase::frozen). Contacts are solved in the order of this crate's colors.
 //!
 //! **Agreement.** Within 6e-5 of its source's method in `f64` (`tests/lab/agree`).
 //!
@@ -18,13 +17,9 @@
 use super::{Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
-use crate::constraints::step::{Collision, CollisionScene};
-use crate::constraints::{ImpactLaw, Passes, Solver};
-use crate::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, LINEAR_SLOP, Parameter};
-use recycle::Recycled;
-
-/// Index of `recycle_distance` among the parameters.
-const RECYCLE_DISTANCE: usize = 2;
+use crate::constraints::{ImpactLaw, Passes, Schedule};
+use crate::narrowphase::frozen::FreezeLimits;
+use crate::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, Parameter};
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {

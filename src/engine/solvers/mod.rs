@@ -31,6 +31,7 @@ use crate::constraints::{ImpactLaw, Passes, Schedule, Solver, StepInput, WorkCou
 use crate::contacts::Contact;
 use crate::error::Error;
 use crate::lanes::LaneWidth;
+use crate::narrowphase::frozen::FreezeLimits;
 use crate::params::{Budget, MAX_PARAMETERS, Mechanism, Parameter, Parameters};
 
 pub mod admm;
@@ -191,6 +192,8 @@ pub struct Variant {
     pub softness: Option<fn(&Parameters, f32) -> [f32; 2]>,
     /// Impact law of its source.
     pub impacts: ImpactLaw,
+    /// Limits within which its source [freezes](crate::narrowphase::frozen) contacts; `None` if it does not.
+    pub frozen: Option<FreezeLimits>,
     /// Default of [continuous collision](crate::continuous).
     pub continuous: bool,
     /// Numbers kept from step to step, in addition to impulses.

@@ -21,6 +21,7 @@ use super::{Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::{Frictionless, Soft, angular_frequencies};
 use crate::constraints::{ImpactLaw, Passes, Schedule};
+use crate::narrowphase::frozen::FreezeLimits;
 use crate::params::{Budget, CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, Parameter};
 
 /// See the [module](self).

@@ -1,6 +1,7 @@
 //! Updates contacts from candidates and carries their impulses from step to step.
 
 use super::World;
+use crate::bodies::BodyKind;
 use crate::constraints::Solver;
 use crate::constraints::step::{Collision, CollisionScene};
 use crate::contacts::Contact;
@@ -9,6 +10,7 @@ use crate::narrowphase::Margins;
 use crate::narrowphase::batch::{self, Input, Jobs, NO_CONTACT, PairKind, Shapes};
 use crate::narrowphase::candidate::{Candidate, Candidates};
 use crate::narrowphase::circles::Rolling;
+use crate::narrowphase::frozen::FrozenContacts;
 use crate::narrowphase::lanes::PoseRow;
 use glam::Vec2;
 

@@ -16,6 +16,7 @@ use crate::constraints::records::kept::Kept;
 use crate::constraints::{Features, Impacts};
 use crate::contacts::Contact;
 use crate::lanes::LaneWidth;
+use crate::narrowphase::frozen::Freezing;
 use crate::params::{Budget, Parameters, Without};
 use crate::shapes::{MassProperties, Shape};
 use crate::solvers;

@@ -4,6 +4,7 @@ use crate::broadphase::BroadPhaseKind;
 use crate::constraints::kernels::motion::{Integrator, RotationUpdate};
 use crate::constraints::{Features, ImpactLaw, Impacts};
 use crate::lanes::{LaneWidth, native_width};
+use crate::narrowphase::frozen::{FreezeLimits, Freezing};
 use crate::params::{Budget, Parameters, Without};
 use crate::solvers::Variant;
 
@@ -86,6 +87,8 @@ pub struct Settings {
     /// How impacts are solved: by the solver's own law, by waves of impacts before the step, or without
     /// bounce.
     pub impacts: Impacts,
+    /// Whether contacts keep their normal and lever arms while bodies hardly move.
+    pub frozen: Freezing,
     /// Sum impulses over the substeps into [`crate::contacts::Contact::step_impulse`].
     pub record_impulses: bool,
     /// Find [`World::contact_events`](crate::world::World::contact_events) after each step.
