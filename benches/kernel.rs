@@ -91,7 +91,7 @@ fn bench_bodies(c: &mut Criterion) {
     let mut group = c.benchmark_group("kernel");
     group.sample_size(20);
     for scene in SCENES {
-        let mut world = common::settled(scene, "soft_step", LaneWidth::W16);
+        let mut world = common::settled(scene, "soft_step", LaneWidth::WIDEST);
         let Workspace { rows, motion, .. } = world.workspace();
         group.throughput(Throughput::Elements(rows.len() as u64));
         group.bench_function(BenchmarkId::new(format!("velocities/{scene}"), "4/1"), |b| {

@@ -9,9 +9,6 @@ use simpulse::lab::scenes;
 /// Scenes whose contacts fit in the second-level cache and in the third-level cache.
 pub const KERNEL_SCENES: [&str; 2] = ["pyramid:30", "large_pyramid"];
 
-/// Widths that have instructions in this build.
-pub const WIDTHS: [LaneWidth; 3] = [LaneWidth::W4, LaneWidth::W8, LaneWidth::W16];
-
 /// A small scene, a medium one, and one without boxes.
 pub const STEP_SCENES: [&str; 3] = ["stack:20", "pyramid:30", "circle_pile:500"];
 

@@ -87,5 +87,9 @@ pub fn run(args: &ProfileArgs) -> Result<ExitCode, Error> {
             print(&format!("{}\n", text::text(&report)))?;
         }
     }
-    if args.json { print_json(&json!({ "profiles": reports })) } else { Ok(ExitCode::SUCCESS) }
+    match reports.as_slice() {
+        [] => Ok(ExitCode::SUCCESS),
+        [report] => print_json(report),
+        reports => print_json(&json!({ "profiles": reports })),
+    }
 }

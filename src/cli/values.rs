@@ -1,7 +1,7 @@
 //! Option values. An option means the same in every command; help and error messages list all its values.
 
 use crate::engine::constraints::Impacts;
-use crate::engine::lanes::{LaneWidth, native_width};
+use crate::engine::lanes::{LaneWidth, native_width, target_features};
 use crate::engine::narrowphase::frozen::{FreezeLimits, Freezing};
 use crate::engine::params::{Budget, Parameters, Without};
 use crate::engine::solvers::{DEFAULT, VARIANTS, Variant, find};
@@ -112,10 +112,15 @@ pub fn solver() -> impl TypedValueParser<Value = &'static Variant> {
 
 /// The parser of `--lanes`.
 pub fn lanes() -> impl TypedValueParser<Value = LaneWidth> {
-    let names = LaneWidth::ALL.map(|w| PossibleValue::new(w.lanes().to_string()));
-    PossibleValuesParser::new(names).try_map(|text| {
+    PossibleValuesParser::new(["1", "4", "8", "16"]).try_map(|text| {
         let width = text.parse().ok().and_then(LaneWidth::from_lanes);
-        width.ok_or_else(|| Error::invalid("lanes", format!("{text} is none of 1, 4, 8, 16")))
+        width.filter(|width| LaneWidth::ALL.contains(width)).ok_or_else(|| {
+            let (features, widest) = (target_features(), LaneWidth::WIDEST.lanes());
+            let message = format!(
+                "{text}: this build is for {features}, with at most {widest} lanes; the feature `emulated` has 16"
+            );
+            Error::invalid("lanes", message)
+        })
     })
 }
 

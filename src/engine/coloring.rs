@@ -11,11 +11,7 @@
 //! colors, and some coloring needs at most Δ + 1. Nothing depends on the lane width: all widths solve in the
 //! same order and give the same bits.
 //!
-//! **Colors kept from step to step** were tried: edges that already existed keep their color, and the others
-//! are fitted in. In a turning drum (25 000 edges, 180 of them new in a step) and on pyramids (54 000) this
-//! took 0.8 to 0.9 of the time of first fit (3.3 ns per edge), plus half of that time to look up the last
-//! colors; in the drum it needed 1.3 more colors. Time is saved instead by not calling [`Coloring::assign`]
-//! while the set of edges does not change.
+//! [`Coloring::assign`] is not called while the set of edges does not change.
 //!
 //! **Source:** Catto 2024, "SIMD Matters" (`catto2024simd`).
 
@@ -97,11 +93,6 @@ impl Coloring {
             self.order[*next as usize] = edge as u32;
             *next += 1;
         }
-    }
-
-    /// Forces the next call of [`Self::assign`] to recompute the colors.
-    pub fn forget(&mut self) {
-        self.starts.clear();
     }
 
     /// Whether the coloring is that of these edges.

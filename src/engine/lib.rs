@@ -41,3 +41,19 @@ pub mod params;
 pub mod shapes;
 pub mod solvers;
 pub mod world;
+
+/// What tests, benches and the laboratory of this repository reach into: kernels and their inputs, the
+/// narrow phase, coloring, numerics, the clock of a step. None of it is part of the API: it may change or go in any
+/// version. The same items are hidden from these pages at their own paths.
+pub mod internal {
+    pub use crate::clock::{Clock, timed, waited};
+    pub use crate::constraints::impacts::{bias, restitution};
+    pub use crate::constraints::kernels::{motion, observe, prepare};
+    pub use crate::constraints::numerics;
+    pub use crate::constraints::records::{bounces, graph};
+    pub use crate::constraints::step::assign;
+    pub use crate::contacts::quad;
+    pub use crate::continuous::{Continuous, EachJoined, Moving, Near};
+    pub use crate::solvers::sap::convex;
+    pub use crate::{coloring, disjoint, narrowphase};
+}

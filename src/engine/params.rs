@@ -112,8 +112,15 @@ pub struct Mechanism {
     pub case: &'static str,
 }
 
+impl Mechanism {
+    pub(crate) const fn new(name: &'static str, case: &'static str, meaning: &'static str) -> Self {
+        Mechanism { name, meaning, case }
+    }
+}
+
 /// The set of a solver's disabled mechanisms, by index in its table; empty by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Without(u32);
 
 impl Without {

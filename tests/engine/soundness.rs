@@ -2,7 +2,7 @@
 //! batches that were never filled panic with a message that names the problem. No read or write is out of
 //! bounds. Run this under valgrind as well (README, Benches).
 
-use simpulse::engine::clock::{Clock, PhaseFilter};
+use simpulse::engine::clock::Clock;
 use simpulse::engine::constraints::ImpactLaw;
 use simpulse::engine::constraints::impacts::restitution::{self, ReadApproach, Rebound};
 use simpulse::engine::constraints::kernels::position::position_sweep;
@@ -377,7 +377,6 @@ fn a_step_says_what_is_wrong_before_it_begins() {
         length_unit: 1.0,
         parameters: [0.0; 8],
         without: Without::default(),
-        phases: PhaseFilter::ALL,
         record_impulses: true,
         points: 0,
     };

@@ -168,8 +168,8 @@ fn every_broad_phase_sees_the_same_edits() {
             let settings = Settings { broadphase: kind, ..Settings::new(solvers::find(solver).unwrap()) };
             edited(World::new(settings), |_| {}).state_hash()
         };
-        let [a, b, c] = BroadPhaseKind::ALL.map(hash);
-        assert!(a == b && b == c, "{solver}: {a:x} {b:x} {c:x}");
+        let [a, b] = BroadPhaseKind::ALL.map(hash);
+        assert!(a == b, "{solver}: {a:x} {b:x}");
     }
 }
 

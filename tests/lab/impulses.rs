@@ -58,7 +58,7 @@ proptest! {
     /// by three orders of magnitude.
     #[test]
     fn momentum_is_kept(seed in prop::collection::vec(
-        (-0.1..0.1, -0.1..0.1, -3.0..3.0, -3.0..3.0, -4.0..4.0), 25), width in 0..4_usize) {
+        (-0.1..0.1, -0.1..0.1, -3.0..3.0, -3.0..3.0, -4.0..4.0), 25), width in 0..LaneWidth::ALL.len()) {
         for variant in VARIANTS.iter().filter(|v| v.promises(Law::Momentum)) {
             let settings = crate::common::with_width(variant, LaneWidth::ALL[width]);
             let mut world = cloud(&seed).build(settings).unwrap();

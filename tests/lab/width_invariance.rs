@@ -86,14 +86,14 @@ fn a_crowded_plate_runs_out_of_colors() {
 #[test]
 fn few_contacts_run_in_fewer_lanes_with_the_same_bits() {
     // A stack of five has colors of one and two contacts, a pyramid of 40 rows colors of hundreds.
-    for (name, lanes) in [("stack:5", LaneWidth::W4), ("pyramid:40", LaneWidth::W16)] {
+    for (name, lanes) in [("stack:5", LaneWidth::W4), ("pyramid:40", LaneWidth::WIDEST)] {
         let scene = crate::common::scene(name);
         let solver = find("soft_step").unwrap();
-        let fitted = Settings { width: LaneWidth::W16, narrowest: LaneWidth::W4, ..settings(solver) };
+        let fitted = Settings { width: LaneWidth::WIDEST, narrowest: LaneWidth::W4, ..settings(solver) };
         let world = run(&scene, fitted, 30);
         assert_eq!(world.lane_width(), lanes, "{name}");
-        let exactly = run(&scene, with_width(solver, LaneWidth::W16), 30);
-        assert_eq!(exactly.lane_width(), LaneWidth::W16, "{name}");
+        let exactly = run(&scene, with_width(solver, LaneWidth::WIDEST), 30);
+        assert_eq!(exactly.lane_width(), LaneWidth::WIDEST, "{name}");
         assert_eq!(world.state_hash(), exactly.state_hash(), "{name}");
     }
 }

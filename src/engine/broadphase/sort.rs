@@ -5,7 +5,7 @@ use wide::u32x16;
 /// Most partners that are sorted in lanes.
 const LANES: usize = 16;
 
-/// Most partners that are sorted by insertion. On a pyramid, where each proxy has three, lanes are slower.
+/// Most partners that are sorted by insertion.
 const FEW: usize = 4;
 
 /// Sorts pairs of proxies, each with the lower index first. Buffers are reused.

@@ -16,10 +16,7 @@
 //! **Pairs.** If few proxies moved, their pairs are removed from the list and searched again, one proxy after
 //! the other. If many moved, all pairs are searched: each leaf descends once, with its bounds, to the later
 //! leaves that overlap them. Of its members, only those that overlap the bounds of the other leaf are tested
-//! against it, sixteen boxes at a time. One descent per proxy took two to three times as long.
-//!
-//! An earlier version was a binary tree with surface-area insertion and rotations, in which each proxy was
-//! reinserted when it left its box. It took 1.2 µs per such proxy.
+//! against it, sixteen boxes at a time.
 //!
 //! **Source:** leaves packed along Hilbert's curve, Kamel and Faloutsos 1993 (`kamel1993`); wide nodes tested
 //! in lanes, Wald, Benthin and Boulos 2008 (`wald2008`); refitting, and rebuilding a degraded tree,

@@ -18,7 +18,7 @@
 //!
 //! and t may advance by the minimum over all vertices. Near the surface the second bound is a Newton step.
 //! Along one axis each such step costs a few products; then the distance is recomputed. A tip that turns away
-//! is reached after two axes; with the first bound alone it takes up to 32.
+//! is reached after two axes, where the first bound alone takes many steps.
 //!
 //! The middle of b is at least its half width w farther along n than its surface, and moves along n by at
 //! most −v·n for the rest of the step, however b turns. So if

@@ -4,8 +4,8 @@
 //! unless a local variable needs more. It discovers that registers run out only when the frame pointer, which
 //! it needs to align the frame, is no longer available. Every second 32-byte spill may then cross a cache
 //! line, and every 64-byte spill may. If a page ends within the frame, a spill may cross the page, which
-//! costs some forty cycles in every batch. Whether this happens depends on where the system places the stack
-//! of the process: one time in five.
+//! costs tens of cycles in every batch. Whether this happens depends on where the system places the stack
+//! of the process.
 
 use std::hint::black_box;
 
@@ -15,10 +15,6 @@ struct CacheLine(#[allow(dead_code, reason = "to have a place on the stack")] u8
 
 /// Aligns the frame of the calling function. To be called once before a kernel's loop, in the function that
 /// the loop is inlined in.
-///
-/// The rigid sweep at eight lanes with 16 registers (AVX2) takes 3 to 5 % less time, and 20 to 40 % less if a
-/// page ended in its frame. At sixteen lanes with 32 registers it takes the same time, and 10 % less if a
-/// page ended in its frame.
 #[inline(always)]
 pub fn align_frame() {
     // Mutable: a constant would not be placed on the stack.

@@ -123,9 +123,7 @@ mod avx512 {
         }
     }
 
-    /// By whole rows: 16 loads, 8 of them with an insert, and 24 shuffles. By half rows (32 loads, 24 of them
-    /// with an insert, and 16 shuffles) sweeps are 6 % slower. Masked broadcasts instead of the inserts made
-    /// no difference.
+    /// By whole rows: 16 loads, 8 of them with an insert, and 24 shuffles, fewer than by half rows.
     #[inline(always)]
     pub fn gather_16(rows: &[BodyRow], index: LaneIndex<[u32; 16]>) -> [f32x16; 8] {
         assert_fits(index.bound(), rows.len(), 1);

@@ -15,8 +15,17 @@ pub enum LaneWidth {
 }
 
 impl LaneWidth {
-    /// Every width, narrowest first.
+    /// Every width of this build, narrowest first: 16 lanes only with instructions for them or with the
+    /// feature `emulated`, since they are slower than 8 otherwise.
+    #[cfg(any(target_feature = "avx512f", feature = "emulated"))]
     pub const ALL: [LaneWidth; 4] = [LaneWidth::W1, LaneWidth::W4, LaneWidth::W8, LaneWidth::W16];
+
+    /// Every width of this build, narrowest first. 16 lanes need AVX-512 or the feature `emulated`.
+    #[cfg(not(any(target_feature = "avx512f", feature = "emulated")))]
+    pub const ALL: [LaneWidth; 3] = [LaneWidth::W1, LaneWidth::W4, LaneWidth::W8];
+
+    /// The widest of [`Self::ALL`].
+    pub const WIDEST: LaneWidth = Self::ALL[Self::ALL.len() - 1];
 
     /// The number of lanes.
     pub const fn lanes(self) -> usize {
@@ -28,9 +37,9 @@ impl LaneWidth {
         }
     }
 
-    /// The width with this many lanes, if any.
+    /// The width with this many lanes, if any, whether or not this build has it.
     pub fn from_lanes(lanes: usize) -> Option<Self> {
-        Self::ALL.into_iter().find(|w| w.lanes() == lanes)
+        [Self::W1, Self::W4, Self::W8, Self::W16].into_iter().find(|w| w.lanes() == lanes)
     }
 }
 

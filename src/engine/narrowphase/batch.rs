@@ -11,7 +11,7 @@ use crate::contacts::{Contact, quad};
 use crate::lanes::{IndexList, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, align_frame, prefetch_records};
 use crate::shapes::Shape;
 use bytemuck::bytes_of;
-use wide::{f32x4, f32x8, f32x16};
+use wide::{f32x4, f32x8};
 
 /// The kernel of a pair of shapes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -182,7 +182,10 @@ pub fn update(
         LaneWidth::W1 => run_of::<f32>(kind),
         LaneWidth::W4 => run_of::<f32x4>(kind),
         LaneWidth::W8 => run_of::<f32x8>(kind),
-        LaneWidth::W16 => run_of::<f32x16>(kind),
+        #[cfg(any(target_feature = "avx512f", feature = "emulated"))]
+        LaneWidth::W16 => run_of::<wide::f32x16>(kind),
+        #[cfg(not(any(target_feature = "avx512f", feature = "emulated")))]
+        LaneWidth::W16 => unreachable!("widths are limited to those of the build"),
     };
     let points = run(jobs, indices, input, contacts, made, change);
     contacts.truncate(made);
@@ -199,8 +202,7 @@ struct JobIndices<'a> {
 /// Collides the pairs of one kind, as [`update`]. New manifolds are built from the given index on.
 type CollideFn = fn(&Jobs, JobIndices, Input, &mut [Contact], usize, &mut dyn FnMut(u32, &Contact)) -> usize;
 
-/// A separate function per kind. In one function for all, the stack use of one kernel made others spill, and
-/// the frames of turning circles made rectangles 18 % slower.
+/// A separate function per kind: in one function for all, the stack use of one kernel would make others spill.
 fn run_of<L: Lanes>(kind: PairKind) -> CollideFn {
     match kind {
         PairKind::Rectangles => run::<L, { PairKind::Rectangles as usize }>,

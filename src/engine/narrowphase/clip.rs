@@ -138,8 +138,6 @@ pub fn touch<L: Lanes>(
 
     // Selection of points. If almost nothing is left of the clipped face, only the deeper end is kept.
     let one_point = same - width;
-    // Tried: keeping the far point of a pair if its other point is near. This changes overlaps in piles by
-    // −4 % to +4 % and gives the solver a seventh more points.
     let near = |s: L| (s - speculative).select_positive(none, one);
     let keep_0 = one_point.select_positive((s_0 - s_1).select_positive(none, one), one).min(near(s_0));
     let keep_1 = one_point.select_positive((s_0 - s_1).select_positive(one, none), one).min(near(s_1));

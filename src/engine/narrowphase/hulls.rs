@@ -25,8 +25,7 @@ use crate::lanes::{LaneIndex, Lanes, MOST_LANES};
 pub struct Hulls<L> {
     hulls: [Hull<L>; 2],
     incident: Hull<L>,
-    /// Slots in use: the largest number of any hull of the batch. Loops unrolled for 3, 4 and 5 slots were
-    /// tried: 3 % slower on triangles and pentagons.
+    /// Slots in use: the largest number of any hull of the batch.
     count: usize,
 }
 

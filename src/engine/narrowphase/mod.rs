@@ -12,27 +12,17 @@
 //!
 //! [`gjk`] and [`epa`] compute the same quantities independently, in `f64`, to check this module.
 
-#[doc(hidden)]
 pub mod batch;
-#[doc(hidden)]
 pub mod candidate;
-#[doc(hidden)]
 pub mod circles;
-#[doc(hidden)]
 pub mod clip;
-#[doc(hidden)]
 pub mod epa;
 pub mod frozen;
 pub mod gjk;
-#[doc(hidden)]
 pub mod hull;
-#[doc(hidden)]
 pub mod hull_circle;
-#[doc(hidden)]
 pub mod hulls;
-#[doc(hidden)]
 pub mod lanes;
-#[doc(hidden)]
 pub mod rectangles;
 
 use crate::contacts::Manifold;

@@ -192,10 +192,6 @@ impl Solver for Admm {
             passes.end_substep(substep);
         }
     }
-
-    fn boxed(&self) -> Box<dyn Solver> {
-        Box::new(self.clone())
-    }
 }
 
 impl Admm {
@@ -216,7 +212,7 @@ impl Admm {
         system.lane_velocities(&mut v.u);
         update([&mut v.u], [&v.bias], |[u], [b]| [[u[0] + b[0], u[1]]]);
         v.trial.clone_from(&v.u);
-        system.soften_lanes(&mut v.trial, &mut v.lambda);
+        system.add_compliance_lanes(&mut v.trial, &mut v.lambda);
         // x = λ − D (u + R λ + (µ |ut|, 0))
         update([&mut v.w, &mut v.target], [&v.z, &v.trial, &v.bias, &v.mass], |_, [z, u, bias, m]| {
             let x = difference(z, product(m, with_slide(u, bias)));
@@ -224,7 +220,7 @@ impl Admm {
         });
         if system.has_joints() {
             v.image.clone_from(&v.target);
-            system.bound_lanes(&mut v.image);
+            system.project_lanes(&mut v.image);
             update([&mut v.w], [&v.target, &v.image], |[w], [x, within]| [sum(w, difference(x, within))]);
         }
         update([&mut v.w], [], |[w], []| [scaled(compliance, w)]);
@@ -255,7 +251,7 @@ impl Admm {
         if system.has_joints() {
             // For joints, z is now λ + w, and w is zero.
             v.trial.clone_from(&v.z);
-            system.bound_lanes(&mut v.z);
+            system.project_lanes(&mut v.z);
             update([&mut v.w], [&v.trial, &v.z], |[w], [both, z]| [sum(w, difference(both, z))]);
         }
         if adapts {
@@ -277,7 +273,7 @@ impl Admm {
             update([&mut v.lambda], [&v.target, &v.u, &v.compliance], |_, [t, u, c]| {
                 [difference(t, product(c, u))]
             });
-            system.yield_lanes(&mut v.lambda, &mut v.compliance);
+            system.solve_compliance_lanes(&mut v.lambda, &mut v.compliance);
         };
         impulses(system, v);
         system.rows().iter_mut().for_each(|row| row.velocity[..3].fill(0.0));
@@ -306,7 +302,7 @@ impl Admm {
             |r: &PointVector, mass: &PointVector| sum_of_products([r, mass], |[r, m]| [r, before(r, m)]);
         // `trial` is the residual.
         v.image.clone_from(&v.u);
-        system.soften_lanes(&mut v.image, &mut v.lambda);
+        system.add_compliance_lanes(&mut v.image, &mut v.lambda);
         update(
             [&mut v.trial, &mut v.direction],
             [&v.target, &v.lambda, &v.image, &v.compliance, &v.mass],
@@ -325,7 +321,7 @@ impl Admm {
             system.push_lanes(&mut v.direction);
             velocities(system.rows(), &mut self.change);
             system.lane_velocities(&mut v.image);
-            system.soften_lanes(&mut v.image, &mut v.direction);
+            system.add_compliance_lanes(&mut v.image, &mut v.direction);
             update([&mut v.image], [&v.direction, &v.compliance], |[image], [p, c]| {
                 [sum(image, quotient(p, c))]
             });

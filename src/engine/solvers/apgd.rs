@@ -4,7 +4,7 @@
 //! **Source.** `mazhar2015`, algorithm of section 4; `anitescu2006` (the relaxation).
 //!
 //! **Departures.** Steps are scaled by each point's effective mass, the same along n and t, so that a cone
-//! stays a cone. L is kept from step to step, which takes 0.90 to 0.97 of the time. The gradient at an
+//! stays a cone. L is kept from step to step. The gradient at an
 //! extrapolated point is extrapolated as well, because the problem is linear. Joint rows are in the same
 //! vectors, each scaled by its own mass and projected on its bounds.
 //!
@@ -69,10 +69,6 @@ impl Solver for Apgd {
     fn step(&mut self, passes: &mut Passes<'_>) {
         step(passes, &mut self.steepness);
     }
-
-    fn boxed(&self) -> Box<dyn Solver> {
-        Box::new(*self)
-    }
 }
 
 fn step(passes: &mut Passes<'_>, steepness: &mut f64) {
@@ -108,7 +104,7 @@ fn step(passes: &mut Passes<'_>, steepness: &mut f64) {
                         },
                     );
                     if system.has_joints() {
-                        system.bound_lanes(&mut next);
+                        system.project_lanes(&mut next);
                         update([&mut step], [&next, &now], |_, [next, now]| [difference(next, now)]);
                     }
                     system.push_lanes(&mut step);

@@ -56,7 +56,7 @@ mod lanes;
 
 use super::{Law, Uses, Variant};
 use crate::clock::Phase;
-use crate::constraints::kernels::types::{Joined, Placed};
+use crate::constraints::kernels::types::{BodyStates, Joined};
 use crate::constraints::numerics::cone;
 use crate::constraints::records::graph::Graph;
 use crate::constraints::records::kept::KeptSize;
@@ -141,13 +141,9 @@ impl Solver for Avbd {
             self.run(passes, Phase::Solve, |descent, on| descent.hold(on));
             keep_impulses(passes, h);
             passes.reload_types();
-            passes.hide_turns();
+            passes.exclude_rotation_from_error();
             passes.end_substep(substep);
         }
-    }
-
-    fn boxed(&self) -> Box<dyn Solver> {
-        Box::new(self.clone())
     }
 }
 
@@ -159,7 +155,7 @@ impl Avbd {
             passes.parts();
         let colored = |types: &[Joined]| types.iter().any(|joined| joined.is_colored());
         let sequence = (lanes.segments().is_empty() && !colored(types)).then(|| serial.contact());
-        self.descent.joints.assign(types, Placed { rows, poses });
+        self.descent.joints.assign(types, BodyStates { rows, poses });
         self.descent.assign(rows, contacts, &self.graph, width, sequence);
     }
 

@@ -18,8 +18,7 @@
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `sweeps` sweeps; then up to `velocity_iterations` factorizations
 //! of a matrix of 3 × 3 blocks, one row of blocks per body, ordered by breadth (`numerics/block_lu.rs`): n b² products of blocks in `f64` for
-//! n bodies in a band of b, one lane. Whole steps take 30 and 58 µs on
-//! `stack:10` and `stack:20`, 0.6 and 4 ms on `pyramid:10` and `pyramid:20` (AMD EPYC, AVX-512, 2026-11-24). Lemke's method goes through a
+//! n bodies in a band of b, one lane. Lemke's method goes through a
 //! tableau of 16m² entries for m points at each pivot, and there are more pivots than points: it loses to Newton's from the first
 //! point on.
 //!

@@ -67,10 +67,6 @@ impl Solver for Jacobi {
     fn step(&mut self, passes: &mut Passes<'_>) {
         step(passes, &mut self.sums);
     }
-
-    fn boxed(&self) -> Box<dyn Solver> {
-        Box::new(self.clone())
-    }
 }
 
 fn step(passes: &mut Passes<'_>, sums: &mut Vec<BodyRow>) {

@@ -83,10 +83,6 @@ impl Solver for MassSplitting {
             passes.end_substep(substep);
         }
     }
-
-    fn boxed(&self) -> Box<dyn Solver> {
-        Box::new(self.clone())
-    }
 }
 
 impl MassSplitting {

@@ -5,10 +5,8 @@
 //!
 //! **Departures.** The last iteration does not extrapolate beyond its sweep, so that impulses end within
 //! their bounds. With joints, |r|² is a sum of energies ([`Conjugate`]), since impulses in N·s and N·m·s
-//! cannot be added: twenty hanging rods take 101 sweeps to 10⁻⁴ instead of 167
-//! (`simpulse converge tests/frozen/hanging-chain-20.frozen`). Symmetric pairs of sweeps, the form of
-//! preconditioner that conjugate gradients require, were tried. Per sweep, they leave 1.3 to 4.4 times
-//! more residual on five of six frozen problems.
+//! cannot be added. Conjugate gradients require a symmetric preconditioner, which a forward sweep is not:
+//! symmetric pairs of sweeps leave more residual per sweep.
 //!
 //! **Agreement.** Within 6e-5 of its source's method in `f64` (`tests/lab/agree`).
 //!

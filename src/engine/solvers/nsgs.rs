@@ -118,10 +118,10 @@ struct PointByPoint<R>(R);
 type Lines<L> = [[L; 2]; 2];
 
 impl<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule> Stages<L, N, O> for PointByPoint<R> {
-    type Begun = Lines<L>;
+    type Partial = Lines<L>;
 
     #[inline(always)]
-    fn nothing() -> Lines<L> {
+    fn empty() -> Lines<L> {
         [[L::zero(); 2]; 2]
     }
 

@@ -119,8 +119,4 @@ impl Solver for PhysX {
         passes.book_impulses();
         self.drifts.book(passes, reach);
     }
-
-    fn boxed(&self) -> Box<dyn Solver> {
-        Box::new(self.clone())
-    }
 }

@@ -2,8 +2,7 @@
 //! and stabilizing sweeps with friction.
 //!
 //! **Source.** `crozet2025rapier` (2D, version 0.35). The pair of rows is that of [`super::pgs_ngs_block`],
-//! with soft rows on its diagonal. Normal rows come before friction rows: in the other order, `many_pyramids`
-//! overlaps by 9 % more, which rapier itself does not (`papers/peers.md`).
+//! with soft rows on its diagonal. Normal rows come before friction rows.
 //!
 //! **Departures.** The contact frequency is clamped to an eighth of the substep rate, which rapier leaves to
 //! its user; at its standard 4 substeps both have 30 Hz. Pairs with a determinant below a thousandth of the

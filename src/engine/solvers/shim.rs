@@ -37,7 +37,7 @@ use crate::constraints::joints::chains::{ChainStage, Chains};
 use crate::constraints::kernels::velocity::rules::{Bearing, Between, Relaxed, Rigid, Soft};
 use crate::constraints::records::kept::KeptSize;
 use crate::constraints::step::{Collision, CollisionScene};
-use crate::constraints::{ImpactLaw, Passes, Solver, Spreading};
+use crate::constraints::{ImpactLaw, ImpactWaves, Passes, Solver};
 use crate::lanes::BodyRow;
 use crate::narrowphase::batch::PairKind;
 use crate::narrowphase::circles::Rolling;
@@ -45,8 +45,8 @@ use crate::params::{Budget, Mechanism, Parameter};
 use frames::Roll;
 use glam::Vec2;
 use jams::Jams;
-use rest::hand_down::HandDown;
-use rest::{BORNE, CALM, PER_CONTACT};
+use rest::hand_down::PropagateLoads;
+use rest::{PER_CONTACT, PRELOAD, REST_TIME};
 use std::f32::consts::TAU;
 
 /// See the [module](self).
@@ -113,64 +113,48 @@ mod part {
 
 /// Mechanisms that a run can leave out, each with the case that fails without it.
 const MECHANISMS: [Mechanism; 12] = [
-    Mechanism {
-        name: "statics",
-        meaning: "springs are shortened by the sag of the loads that contacts bear at rest",
-        case: "B24.bricks",
-    },
-    Mechanism { name: "hand_down", meaning: "loads go down from body to body", case: "B5.height" },
-    Mechanism {
-        name: "rising",
-        meaning: "springs are shortened for more load only where nothing moves, within 3 s",
-        case: "random ratios restless",
-    },
-    Mechanism {
-        name: "bearing",
-        meaning: "springs bear a load however deep their contact is",
-        case: "B19.share",
-    },
-    Mechanism {
-        name: "frames",
-        meaning: "what rolls has the frame of the middle of the step",
-        case: "A26.plank",
-    },
-    Mechanism {
-        name: "impacts",
-        meaning: "what comes in bounces or stops before the step",
-        case: "A17.billiards",
-    },
-    Mechanism { name: "moment", meaning: "impacts happen at their time in the step", case: "A27.oblique" },
-    Mechanism {
-        name: "release",
-        meaning: "points that an impact releases have borne their body until then",
-        case: "A26.block",
-    },
-    Mechanism {
-        name: "jams",
-        meaning: "what is caught or squeezed begins a step without impulses, within the speed that squeezes it",
-        case: "random driven energy",
-    },
-    Mechanism {
-        name: "once",
-        meaning: "contacts of one point are shortened once, as soon as nothing moves",
-        case: "rest::a_pile_of_discs_hardly_breathes",
-    },
-    Mechanism {
-        name: "chains",
-        meaning: "chains of joints that hang from what does not move are solved at once",
-        case: "B17.ratio",
-    },
-    Mechanism {
-        name: "unequal",
-        meaning: "contacts between bodies of unequal masses are damped more and over-relaxed",
-        case: "random ratios restless",
-    },
+    Mechanism::new(
+        "statics",
+        "B24.bricks",
+        "springs are shortened by the sag of the loads that contacts bear at rest",
+    ),
+    Mechanism::new("hand_down", "B5.height", "loads go down from body to body"),
+    Mechanism::new(
+        "rising",
+        "random ratios restless",
+        "springs are shortened for more load only where nothing moves, within 3 s",
+    ),
+    Mechanism::new("bearing", "B19.share", "springs bear a load however deep their contact is"),
+    Mechanism::new("frames", "A26.plank", "what rolls has the frame of the middle of the step"),
+    Mechanism::new("impacts", "A17.billiards", "what comes in bounces or stops before the step"),
+    Mechanism::new("moment", "A27.oblique", "impacts happen at their time in the step"),
+    Mechanism::new("release", "A26.block", "points that an impact releases have borne their body until then"),
+    Mechanism::new(
+        "jams",
+        "random driven energy",
+        "what is caught or squeezed begins a step without impulses, within the speed that squeezes it",
+    ),
+    Mechanism::new(
+        "once",
+        "rest::a_pile_of_discs_hardly_breathes",
+        "contacts of one point are shortened once, as soon as nothing moves",
+    ),
+    Mechanism::new(
+        "chains",
+        "B17.ratio",
+        "chains of joints that hang from what does not move are solved at once",
+    ),
+    Mechanism::new(
+        "unequal",
+        "random ratios restless",
+        "contacts between bodies of unequal masses are damped more and over-relaxed",
+    ),
 ];
 
 /// State kept between steps.
 #[derive(Clone, Debug, Default)]
 struct Shim {
-    hand_down: HandDown,
+    hand_down: PropagateLoads,
     jams: Jams,
     chains: Chains,
     /// Whether a dynamic body has a joint; empty without joints. `[bodies]`
@@ -248,9 +232,9 @@ impl Solver for Shim {
             self.chains = Chains::default();
         }
         for substep in 0..budget.substeps {
-            if substep == 0 || self.chains.lends() {
+            if substep == 0 || self.chains.has_effective_mass_scaling() {
                 passes.integrate_velocities();
-                passes.note_chains(&mut self.chains);
+                passes.snapshot_chains(&mut self.chains);
                 passes.warm_start();
             } else {
                 passes.integrate_and_warm_start();
@@ -273,10 +257,6 @@ impl Solver for Shim {
         }
         passes.leave_chains(&mut self.chains);
         self.stepped = passes.parts().work.rows.len() - 1;
-    }
-
-    fn boxed(&self) -> Box<dyn Solver> {
-        Box::new(self.clone())
     }
 }
 
@@ -304,8 +284,8 @@ impl Shim {
         for (i, contact) in scene.contacts.iter().enumerate() {
             if contact.body_a.max(contact.body_b) >= stepped {
                 let kept = scene.kept.contact(i);
-                kept[CALM] = 1.0;
-                kept[BORNE..].fill(-1.0);
+                kept[REST_TIME] = 1.0;
+                kept[PRELOAD..].fill(-1.0);
             }
         }
     }
@@ -313,9 +293,9 @@ impl Shim {
     /// Solves impacts before the step.
     fn impacts(&mut self, passes: &mut Passes<'_>) {
         if passes.impacts() == SOLVER.impacts && passes.has(part::IMPACTS) {
-            passes.spread_impacts(Spreading {
+            passes.spread_impacts(ImpactWaves {
                 timed: passes.has(part::MOMENT),
-                stops: Some(&self.joined),
+                inelastic_except: Some(&self.joined),
                 releases: passes.has(part::RELEASE),
                 visits: visits(passes.budget().substeps),
             });

@@ -86,8 +86,4 @@ impl Solver for Shock {
             passes.end_substep(substep);
         }
     }
-
-    fn boxed(&self) -> Box<dyn Solver> {
-        Box::new(self.clone())
-    }
 }

@@ -50,10 +50,6 @@ impl Solver for SplitImpulse {
     fn step(&mut self, passes: &mut Passes<'_>) {
         step(passes, &mut self.before);
     }
-
-    fn boxed(&self) -> Box<dyn Solver> {
-        Box::new(self.clone())
-    }
 }
 
 fn step(passes: &mut Passes<'_>, before: &mut Vec<BodyRow>) {

@@ -100,8 +100,4 @@ impl Solver for TgsSticky {
         passes.book_impulses();
         self.drifts.book(passes, reach);
     }
-
-    fn boxed(&self) -> Box<dyn Solver> {
-        Box::new(self.clone())
-    }
 }

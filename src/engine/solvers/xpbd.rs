@@ -102,10 +102,6 @@ impl Solver for Xpbd {
             passes.end_substep(substep);
         }
     }
-
-    fn boxed(&self) -> Box<dyn Solver> {
-        Box::new(self.clone())
-    }
 }
 
 /// v ← v + (x − x_before)/h.

@@ -124,7 +124,8 @@ impl World {
         let rolling = asked.rolling.map(|Rolling { limit }| Rolling { limit: AHEAD * limit });
         let input = Input { poses, ways, rolling, shapes, margins: Margins::of(self.settings.length_unit) };
         for (kind, jobs) in PairKind::ALL.into_iter().zip(jobs) {
-            points += batch::update(kind, self.settings.width, jobs, input, &mut self.contacts, &mut change);
+            points +=
+                batch::update(kind, self.settings.widths()[1], jobs, input, &mut self.contacts, &mut change);
         }
         if narrow.is_changed {
             narrow.sort_contacts(&mut self.contacts);

@@ -3,7 +3,7 @@
 use super::World;
 use crate::bodies::{Bodies, BodyHandle};
 use crate::constraints::joints::Joints;
-use crate::constraints::kernels::types::{Booked, ConstraintType, Joined, Placed};
+use crate::constraints::kernels::types::{BodyStates, ConstraintType, Joined, RecordedImpulses};
 use crate::constraints::records::rows::{ROWS, RowBlock};
 use crate::error::Error;
 use crate::joints::{Definition, Form, Joint, JointHandle, JointKind, JointState, measured, of_kind};
@@ -164,7 +164,7 @@ impl World {
 
     /// Impulses of a joint in the last step, with `Settings::record_impulses`; `None` without it, or if the
     /// joint was added since. Errors: the joint was removed.
-    pub fn joint_impulses(&self, handle: JointHandle) -> Result<Option<Booked>, Error> {
+    pub fn joint_impulses(&self, handle: JointHandle) -> Result<Option<RecordedImpulses>, Error> {
         self.joint(handle)?;
         let place = self.joints.places[handle.index()];
         Ok(place.and_then(|[group, i]| self.work.types[group as usize].kind.booked(i as usize)))
@@ -194,7 +194,7 @@ impl World {
             kind.begin(bodies, h);
             for i in 0..kind.ends().len() {
                 found.clear();
-                kind.collect(i, Placed { rows: &rows, poses: &poses }, &mut found);
+                kind.collect(i, BodyStates { rows: &rows, poses: &poses }, &mut found);
                 blocks.extend(found.iter().map(|&block| (number, block)));
                 number += 1;
             }
@@ -213,7 +213,7 @@ impl World {
                 of_group[i as usize] = Some(handle);
             }
         }
-        let on = Placed { rows: &work.rows, poses: &work.poses };
+        let on = BodyStates { rows: &work.rows, poses: &work.poses };
         let (mut last, mut step, mut solved) = (Vec::new(), Vec::new(), Vec::new());
         if work.poses.len() != work.rows.len() {
             return solved;

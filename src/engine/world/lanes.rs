@@ -9,7 +9,7 @@ impl World {
     /// Assigns every contact to a lane. The last step's lanes are reused while the set of contacts is the
     /// same.
     pub(super) fn assign_lanes(&mut self, features: &Features) {
-        let widths = [self.settings.narrowest, self.settings.width];
+        let widths = self.settings.widths();
         let choice = Some((self.solver_is.name, widths, self.settings.order, *features));
         if !self.narrow.is_changed && self.lanes_are_for == choice {
             return;

@@ -8,123 +8,46 @@ use super::edit::{Slots, StandingForces};
 use super::events::Events;
 use super::joints::SavedJoints;
 use super::traits::Traits;
-use super::{Order, Settings, World};
+use super::{Settings, World};
 use crate::bodies::{BodyDef, BodyKind};
-use crate::broadphase::BroadPhaseKind;
-use crate::constraints::kernels::motion::{Integrator, RotationUpdate};
 use crate::constraints::records::kept::Kept;
-use crate::constraints::{Features, Impacts};
 use crate::contacts::Contact;
 use crate::lanes::LaneWidth;
-use crate::narrowphase::frozen::Freezing;
-use crate::params::{Budget, Parameters, Without};
 use crate::shapes::{MassProperties, Shape};
-use crate::solvers;
+use crate::solvers::{self, Variant};
 use glam::Vec2;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// [`Settings`] with names and numbers instead of static references.
-#[derive(Serialize, Deserialize)]
-struct SavedSettings {
-    solver: String,
-    lanes: usize,
-    narrowest_lanes: usize,
-    order: Order,
-    budget: Budget,
-    gravity: [f32; 2],
-    dt: f32,
-    #[serde(default = "one")]
-    length_unit: f32,
-    parameters: Parameters,
-    /// Names of disabled mechanisms.
-    #[serde(default)]
-    without: Vec<String>,
-    impacts: Impacts,
-    #[serde(default)]
-    frozen: Freezing,
-    record_impulses: bool,
-    contact_events: bool,
-    observe_rule: bool,
-    timed: bool,
-    broadphase: BroadPhaseKind,
-    integrator: Integrator,
-    rotation: RotationUpdate,
-    continuous: bool,
-    extra_features: Features,
-}
-
-impl Serialize for Settings {
-    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        let s = self;
-        let saved = SavedSettings {
-            solver: s.solver.name.into(),
-            lanes: s.width.lanes(),
-            narrowest_lanes: s.narrowest.lanes(),
-            order: s.order,
-            budget: s.budget,
-            gravity: s.gravity,
-            dt: s.dt,
-            length_unit: s.length_unit,
-            parameters: s.parameters,
-            without: {
-                let names = s.solver.mechanisms.iter().enumerate();
-                names.filter(|(i, _)| s.without.leaves_out(*i)).map(|(_, m)| m.name.into()).collect()
-            },
-            impacts: s.impacts,
-            frozen: s.frozen,
-            record_impulses: s.record_impulses,
-            contact_events: s.contact_events,
-            observe_rule: s.observe_rule,
-            timed: s.timed,
-            broadphase: s.broadphase,
-            integrator: s.integrator,
-            rotation: s.rotation,
-            continuous: s.continuous,
-            extra_features: s.extra_features,
-        };
-        saved.serialize(to)
-    }
-}
-
-/// Default length unit: one meter.
-fn one() -> f32 {
+/// Default length unit of saved settings: one meter.
+pub(super) fn one() -> f32 {
     1.0
 }
 
-/// Errors: an unknown solver, a number of lanes other than 1, 4, 8 and 16.
-impl<'de> Deserialize<'de> for Settings {
-    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        let s = SavedSettings::deserialize(from)?;
-        let error = serde::de::Error::custom::<String>;
-        let lanes =
-            |n: usize| LaneWidth::from_lanes(n).ok_or_else(|| error(format!("{n} lanes: 1, 4, 8 or 16")));
-        let solver = solvers::find(&s.solver).map_err(|e| error(e.to_string()))?;
-        let without = s.without.iter().try_fold(Without::default(), |all, name| {
-            solver.mechanism(name).map(|place| all.and(place)).map_err(|e| error(e.to_string()))
-        })?;
-        Ok(Settings {
-            solver,
-            without,
-            width: lanes(s.lanes)?,
-            narrowest: lanes(s.narrowest_lanes)?,
-            order: s.order,
-            budget: s.budget,
-            gravity: s.gravity,
-            dt: s.dt,
-            length_unit: s.length_unit,
-            parameters: s.parameters,
-            impacts: s.impacts,
-            frozen: s.frozen,
-            record_impulses: s.record_impulses,
-            contact_events: s.contact_events,
-            observe_rule: s.observe_rule,
-            timed: s.timed,
-            broadphase: s.broadphase,
-            integrator: s.integrator,
-            rotation: s.rotation,
-            continuous: s.continuous,
-            extra_features: s.extra_features,
-        })
+/// A solver by its name. Errors: an unknown one.
+pub(super) mod solver {
+    use super::*;
+
+    pub fn serialize<S: Serializer>(solver: &&'static Variant, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(solver.name)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<&'static Variant, D::Error> {
+        solvers::find(&String::deserialize(from)?).map_err(serde::de::Error::custom)
+    }
+}
+
+/// A width by its number of lanes. Errors: a number other than 1, 4, 8 and 16.
+pub(super) mod lanes {
+    use super::*;
+
+    pub fn serialize<S: Serializer>(width: &LaneWidth, to: S) -> Result<S::Ok, S::Error> {
+        width.lanes().serialize(to)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<LaneWidth, D::Error> {
+        let n = usize::deserialize(from)?;
+        let error = || serde::de::Error::custom(format!("{n} lanes: 1, 4, 8 or 16"));
+        LaneWidth::from_lanes(n).ok_or_else(error)
     }
 }
 

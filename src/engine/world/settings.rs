@@ -60,13 +60,17 @@ impl Order {
 /// # Ok::<(), simpulse_engine::error::Error>(())
 /// ```
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Settings {
     /// The solver: a row of [`crate::solvers::VARIANTS`].
+    #[cfg_attr(feature = "serde", serde(with = "super::saved::solver"))]
     pub solver: &'static Variant,
     /// Maximum number of lanes per instruction.
+    #[cfg_attr(feature = "serde", serde(rename = "lanes", with = "super::saved::lanes"))]
     pub width: LaneWidth,
     /// Minimum number of lanes that the engine may fall back to when colors are small; see [`Self::exactly`].
     /// Every width gives the same bits.
+    #[cfg_attr(feature = "serde", serde(rename = "narrowest_lanes", with = "super::saved::lanes"))]
     pub narrowest: LaneWidth,
     /// Order in which constraints are solved.
     pub order: Order,
@@ -79,15 +83,18 @@ pub struct Settings {
     /// Size of typical bodies (m). The engine's own lengths and speeds, such as the slop and the push speed
     /// ([`crate::params`]), are chosen for bodies of about a meter. They are multiplied by this, and
     /// so are `parameters` in m and m/s. A scene therefore moves in the same way at any scale.
+    #[cfg_attr(feature = "serde", serde(default = "super::saved::one"))]
     pub length_unit: f32,
     /// Values of the solver's own parameters, see [`Variant::set`].
     pub parameters: Parameters,
     /// Disabled mechanisms of the solver, see [`Variant::mechanism`].
+    #[cfg_attr(feature = "serde", serde(default))]
     pub without: Without,
     /// How impacts are solved: by the solver's own law, by waves of impacts before the step, or without
     /// bounce.
     pub impacts: Impacts,
     /// Whether contacts keep their normal and lever arms while bodies hardly move.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub frozen: Freezing,
     /// Sum impulses over the substeps into [`crate::contacts::Contact::step_impulse`].
     pub record_impulses: bool,
@@ -139,7 +146,13 @@ impl Settings {
         }
     }
 
-    /// Always uses `width` lanes, whatever the scene.
+    /// The narrowest and the widest lanes, limited to those of this build.
+    pub(crate) fn widths(&self) -> [LaneWidth; 2] {
+        [self.narrowest, self.width].map(|width| width.min(LaneWidth::WIDEST))
+    }
+
+    /// Always uses `width` lanes, or the widest of [`LaneWidth::ALL`] if this build does not have as many,
+    /// whatever the scene.
     pub fn exactly(self, width: LaneWidth) -> Self {
         Settings { width, narrowest: width, ..self }
     }

@@ -116,7 +116,7 @@ pub struct ImpactRecords {
     /// Side records of the colored batches, then of the serial ones.
     pub bounces: [Bounces; 2],
     /// Impacts before the step.
-    pub(crate) spread: spread::Spread,
+    pub(crate) spread: spread::ImpactPropagation,
 }
 
 impl ImpactRecords {}

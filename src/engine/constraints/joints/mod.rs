@@ -12,7 +12,7 @@ use crate::bodies::Bodies;
 use crate::clock::Phase;
 use crate::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W};
 use crate::constraints::kernels::pass::{PassMode, VectorTask, at_width};
-use crate::constraints::kernels::types::{Booked, ConstraintType, Placed, TypeInput, TypeRows};
+use crate::constraints::kernels::types::{BodyStates, ConstraintType, RecordedImpulses, TypeInput, TypeRows};
 use crate::constraints::records::links::{ChainLink, LinkImpulses, LinkRows, LinkRule};
 use crate::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowStore};
 use crate::narrowphase::lanes::PoseRow;
@@ -100,7 +100,7 @@ pub struct Joints<T: JointType> {
     /// Angles (rad); see [`Placing::angle`]. `[joints]`
     angles: Vec<f32>,
     /// Impulses of the step; empty unless they are recorded. `[joints]`
-    booked: Vec<Booked>,
+    booked: Vec<RecordedImpulses>,
     /// Sums of `kept` over the substeps of the step; empty unless they are recorded. `[joints × kept]`
     summed: Vec<f32>,
     /// Substep to which the impulses belong (s).
@@ -170,74 +170,16 @@ impl<T: JointType> Joints<T> {
         ANCHORS + T::numbers(self.form)
     }
 
-    fn fill<L: Lanes>(&self, on: TypeInput<'_>) {
-        let (numbers, kept) = (T::numbers(self.form), T::kept(self.form));
-        let stride = self.stride();
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let parts = on.batches.records_with_stride::<L>(&segment, stride);
-            let indices = parts.row_a.batches::<L::Index>().zip(parts.row_b.batches::<L::Index>());
-            let indices = parts.contact.batches::<L::Index>().zip(indices).enumerate();
-            for (record, (batch, (joints, (row_a, row_b)))) in
-                parts.records.chunks_exact_mut(stride).zip(indices)
-            {
-                let filled = segment.filled(batch, L::WIDTH);
-                let (a, b) = if self.swapped { (row_b, row_a) } else { (row_a, row_b) };
-                record[..ANCHORS].copy_from_slice(&placed_anchors::<L>(
-                    &self.anchors,
-                    on.poses,
-                    joints,
-                    [a, b],
-                ));
-                let floats: &mut [f32] = bytemuck::cast_slice_mut(record);
-                if filled < L::WIDTH {
-                    // Padding lanes are zero.
-                    floats.chunks_exact_mut(L::WIDTH).for_each(|lanes| lanes[filled..].fill(0.0));
-                    floats[ANCHORS * L::WIDTH..].fill(0.0);
-                }
-                for (lane, &joint) in joints.entries()[..filled].iter().enumerate() {
-                    let joint = joint as usize;
-                    let values = self.numbers[joint * numbers..][..numbers].iter();
-                    let values = values.chain(&self.kept[joint * kept..][..kept]);
-                    for (to, &value) in floats[ANCHORS * L::WIDTH..].chunks_exact_mut(L::WIDTH).zip(values) {
-                        to[lane] = value;
-                    }
-                }
-            }
-        }
-    }
-
-    /// Writes the kept numbers of records back, except the impulses of links, which `keep_links` sets.
-    fn store<L: Lanes>(&mut self, on: TypeInput<'_>) {
-        let (numbers, kept) = (self.first_kept(), T::kept(self.form));
-        let stride = self.stride();
-        let of_links = if self.linked.is_active() { self.rigid } else { None };
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let parts = on.batches.records_with_stride::<L>(&segment, stride);
-            let lists = parts.contact.batches::<L::Index>();
-            for (batch, (record, joints)) in parts.records.chunks_exact_mut(stride).zip(lists).enumerate() {
-                let floats: &[f32] = bytemuck::cast_slice(&record[numbers..]);
-                let filled = segment.filled(batch, L::WIDTH);
-                for (lane, &joint) in joints.entries()[..filled].iter().enumerate() {
-                    let [place, rows] = of_links.filter(|_| self.linked.has(joint)).unwrap_or_default();
-                    let values = self.kept[joint as usize * kept..][..kept].iter_mut().enumerate();
-                    for ((i, value), from) in values.zip(floats.chunks_exact(L::WIDTH)) {
-                        if !(place..place + rows).contains(&i) {
-                            *value = from[lane];
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    fn forget<L: Lanes>(&self, on: TypeInput<'_>) {
-        let (numbers, stride) = (self.first_kept(), self.stride());
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let parts = on.batches.records_with_stride::<L>(&segment, stride);
-            parts.records.chunks_exact_mut(stride).for_each(|record| record[numbers..].fill(L::zero()));
+    /// Their numbers, for passes that only move them.
+    fn all(&mut self) -> JointNumbers<'_> {
+        JointNumbers {
+            anchors: &self.anchors,
+            numbers: &self.numbers,
+            kept: &mut self.kept,
+            counts: [T::numbers(self.form), T::kept(self.form)],
+            swapped: self.swapped,
+            linked: &self.linked,
+            rigid: self.rigid,
         }
     }
 
@@ -384,7 +326,7 @@ impl<T: JointType> Joints<T> {
 impl<T: JointType> Joints<T> {
     /// The two bodies of one joint, in one lane, and their indices.
     #[inline]
-    fn pair(&self, joint: usize, Placed { rows, poses }: Placed<'_>) -> (JointPair<f32>, [u32; 2]) {
+    fn pair(&self, joint: usize, BodyStates { rows, poses }: BodyStates<'_>) -> (JointPair<f32>, [u32; 2]) {
         let [a, b] = self.ends[joint];
         let names = if self.swapped { [b, a] } else { [a, b] };
         let [at, of_a, of_b] = [joint as u32, names[0], names[1]].map(|i| [i; MOST_LANES]);
@@ -396,12 +338,103 @@ impl<T: JointType> Joints<T> {
 
     /// States the rows of one joint, in one lane, to a pass over `blocks`. `booked`: with the impulses of the
     /// whole step.
-    fn state(&mut self, joint: usize, on: Placed<'_>, blocks: Blocks<'_>, booked: bool) {
+    fn state(&mut self, joint: usize, on: BodyStates<'_>, blocks: Blocks<'_>, booked: bool) {
         let (pair, names) = self.pair(joint, on);
         let (numbers, kept) = (T::numbers(self.form), T::kept(self.form));
         let numbers = &self.numbers[joint * numbers..][..numbers];
         let kept = &mut if booked { &mut self.summed } else { &mut self.kept }[joint * kept..][..kept];
         rows_once::<T, f32>(self.form, numbers, kept, &mut Collected { pair, names, blocks });
+    }
+}
+
+/// The numbers of joints, whatever their type: passes that only move them are compiled once per width.
+struct JointNumbers<'a> {
+    anchors: &'a [Quad],
+    numbers: &'a [f32],
+    kept: &'a mut [f32],
+    /// How many numbers and kept numbers a joint has.
+    counts: [usize; 2],
+    swapped: bool,
+    linked: &'a Linked,
+    rigid: Option<[usize; 2]>,
+}
+
+impl JointNumbers<'_> {
+    fn first_kept(&self) -> usize {
+        ANCHORS + self.counts[0]
+    }
+
+    fn stride(&self) -> usize {
+        self.first_kept() + self.counts[1]
+    }
+
+    fn fill<L: Lanes>(self, on: TypeInput<'_>) {
+        let ([numbers, kept], stride) = (self.counts, self.stride());
+        for i in 0..on.batches.visits().len() {
+            let segment = on.batches.visits()[i];
+            let parts = on.batches.records_with_stride::<L>(&segment, stride);
+            let indices = parts.row_a.batches::<L::Index>().zip(parts.row_b.batches::<L::Index>());
+            let indices = parts.contact.batches::<L::Index>().zip(indices).enumerate();
+            for (record, (batch, (joints, (row_a, row_b)))) in
+                parts.records.chunks_exact_mut(stride).zip(indices)
+            {
+                let filled = segment.filled(batch, L::WIDTH);
+                let (a, b) = if self.swapped { (row_b, row_a) } else { (row_a, row_b) };
+                record[..ANCHORS].copy_from_slice(&placed_anchors::<L>(
+                    self.anchors,
+                    on.poses,
+                    joints,
+                    [a, b],
+                ));
+                let floats: &mut [f32] = bytemuck::cast_slice_mut(record);
+                if filled < L::WIDTH {
+                    // Padding lanes are zero.
+                    floats.chunks_exact_mut(L::WIDTH).for_each(|lanes| lanes[filled..].fill(0.0));
+                    floats[ANCHORS * L::WIDTH..].fill(0.0);
+                }
+                for (lane, &joint) in joints.entries()[..filled].iter().enumerate() {
+                    let joint = joint as usize;
+                    let values = self.numbers[joint * numbers..][..numbers].iter();
+                    let values = values.chain(&self.kept[joint * kept..][..kept]);
+                    for (to, &value) in floats[ANCHORS * L::WIDTH..].chunks_exact_mut(L::WIDTH).zip(values) {
+                        to[lane] = value;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Writes the kept numbers of records back, except the impulses of links, which `keep_links` sets.
+    fn store<L: Lanes>(self, on: TypeInput<'_>) {
+        let (numbers, kept, stride) = (self.first_kept(), self.counts[1], self.stride());
+        let of_links = if self.linked.is_active() { self.rigid } else { None };
+        for i in 0..on.batches.visits().len() {
+            let segment = on.batches.visits()[i];
+            let parts = on.batches.records_with_stride::<L>(&segment, stride);
+            let lists = parts.contact.batches::<L::Index>();
+            for (batch, (record, joints)) in parts.records.chunks_exact_mut(stride).zip(lists).enumerate() {
+                let floats: &[f32] = bytemuck::cast_slice(&record[numbers..]);
+                let filled = segment.filled(batch, L::WIDTH);
+                for (lane, &joint) in joints.entries()[..filled].iter().enumerate() {
+                    let [place, rows] = of_links.filter(|_| self.linked.has(joint)).unwrap_or_default();
+                    let values = self.kept[joint as usize * kept..][..kept].iter_mut().enumerate();
+                    for ((i, value), from) in values.zip(floats.chunks_exact(L::WIDTH)) {
+                        if !(place..place + rows).contains(&i) {
+                            *value = from[lane];
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn forget<L: Lanes>(self, on: TypeInput<'_>) {
+        let (numbers, stride) = (self.first_kept(), self.stride());
+        for i in 0..on.batches.visits().len() {
+            let segment = on.batches.visits()[i];
+            let parts = on.batches.records_with_stride::<L>(&segment, stride);
+            parts.records.chunks_exact_mut(stride).for_each(|record| record[numbers..].fill(L::zero()));
+        }
     }
 }
 
@@ -492,15 +525,15 @@ impl<T: JointType> ConstraintType for Joints<T> {
         match (on.phase, on.mode) {
             (_, PassMode::Masses) => {}
             (_, PassMode::Vector(of)) => at_width!(width, Self::vector_pass(self, of, on)),
-            (_, PassMode::TakeUp) => at_width!(width, Self::take_up(self, on)),
-            (_, PassMode::Forget) => at_width!(width, Self::forget(self, on)),
+            (_, PassMode::LoadDirectImpulses) => at_width!(width, Self::load_direct_impulses(self, on)),
+            (_, PassMode::Forget) => at_width!(width, JointNumbers::forget(self.all(), on)),
             (_, PassMode::Book) => {
-                self.booked.resize(self.joints.len(), Booked::default());
+                self.booked.resize(self.joints.len(), RecordedImpulses::default());
                 self.summed.resize(self.kept.len(), 0.0);
                 at_width!(width, Self::book(self, on));
             }
-            (Phase::Prepare, _) => at_width!(width, Self::fill(self, on)),
-            (Phase::Store, _) => at_width!(width, Self::store(self, on)),
+            (Phase::Prepare, _) => at_width!(width, JointNumbers::fill(self.all(), on)),
+            (Phase::Store, _) => at_width!(width, JointNumbers::store(self.all(), on)),
             (Phase::WarmStart, _) => at_width!(width, Self::warm_start(self, on)),
             (_, PassMode::Position { max_correction, impulses }) => {
                 let by =
@@ -527,15 +560,15 @@ impl<T: JointType> ConstraintType for Joints<T> {
         }
     }
 
-    fn collect(&mut self, constraint: usize, on: Placed<'_>, to: &mut Vec<RowBlock>) {
+    fn collect(&mut self, constraint: usize, on: BodyStates<'_>, to: &mut Vec<RowBlock>) {
         self.state(constraint, on, Blocks::To(to), false);
     }
 
-    fn replace(&mut self, constraint: usize, on: Placed<'_>, blocks: &[RowBlock]) {
+    fn replace(&mut self, constraint: usize, on: BodyStates<'_>, blocks: &[RowBlock]) {
         self.state(constraint, on, Blocks::From(blocks.iter()), false);
     }
 
-    fn collect_booked(&mut self, constraint: usize, on: Placed<'_>, to: &mut Vec<RowBlock>) {
+    fn collect_booked(&mut self, constraint: usize, on: BodyStates<'_>, to: &mut Vec<RowBlock>) {
         self.summed.resize(self.kept.len(), 0.0);
         self.state(constraint, on, Blocks::To(to), true);
     }
@@ -565,7 +598,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
         &self.kept[constraint * kept..][..kept]
     }
 
-    fn booked(&self, constraint: usize) -> Option<Booked> {
+    fn booked(&self, constraint: usize) -> Option<RecordedImpulses> {
         self.booked.get(constraint).copied()
     }
 

@@ -319,7 +319,7 @@ impl<L: Lanes> JointPass<L> for Vectors<'_, L> {
                     };
                 }
             }
-            VectorTask::Soften => {
+            VectorTask::AddCompliance => {
                 if let RowLaw::Spring { damping, .. } = law {
                     let (k, scale) = (pair.response(&j), one / damping.max(least));
                     for r in 0..N {
@@ -330,7 +330,7 @@ impl<L: Lanes> JointPass<L> for Vectors<'_, L> {
                     }
                 }
             }
-            VectorTask::Yield => {
+            VectorTask::SolveCompliance => {
                 if let RowLaw::Spring { damping, .. } = law {
                     // (y⁻¹ + R) x' = y⁻¹ x
                     let (mut k, scale) = (pair.response(&j), one / damping.max(least));
@@ -347,7 +347,7 @@ impl<L: Lanes> JointPass<L> for Vectors<'_, L> {
                     (0..N).for_each(|i| x[at(i)] = solved[i]);
                 }
             }
-            VectorTask::Bound => {
+            VectorTask::Project => {
                 let cap = match law {
                     RowLaw::Motor { cap, .. } => Some(cap),
                     RowLaw::Spring { cap, .. } => cap,

@@ -199,11 +199,11 @@ impl Motion {
                 }
             }
         }
-        self.hide_turns(rows);
+        self.exclude_rotation_from_error(rows);
     }
 
     /// Moves the rotations of round bodies out of their rows, until [`Self::finish`].
-    pub(crate) fn hide_turns(&mut self, rows: &mut [BodyRow]) {
+    pub(crate) fn exclude_rotation_from_error(&mut self, rows: &mut [BodyRow]) {
         // A contact's anchor turns with its body, as a corner does. The contact point of a disc does not: it
         // stays on the line of centers however the disc rolls. So the rotation of a round body is hidden from
         // the sweeps and kept here for its pose. Otherwise a disc that rolls at 7 rad/s and 60 Hz appears to

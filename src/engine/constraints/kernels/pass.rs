@@ -58,7 +58,7 @@ pub enum PassMode {
     /// Accumulated impulses are added to the totals of the step, for metrics.
     Book,
     /// Records take up the impulses of rigid rows that sweeps leave alone.
-    TakeUp,
+    LoadDirectImpulses,
     /// No warm starting: accumulated impulses are set to zero, and nothing else happens.
     Forget,
 }
@@ -80,11 +80,11 @@ pub enum VectorTask {
     /// x = b
     Bias,
     /// x ← x + R y
-    Soften,
+    AddCompliance,
     /// x ← (1 + y R)⁻¹ x, y diagonal
-    Yield,
+    SolveCompliance,
     /// x is projected onto the bounds of the impulses.
-    Bound,
+    Project,
 }
 
 /// Calls a function that is compiled per width only, at the lanes of `$width`.
@@ -94,7 +94,10 @@ macro_rules! at_width {
             LaneWidth::W1 => $($pass)::+::<f32>($($arg),*),
             LaneWidth::W4 => $($pass)::+::<wide::f32x4>($($arg),*),
             LaneWidth::W8 => $($pass)::+::<wide::f32x8>($($arg),*),
+            #[cfg(any(target_feature = "avx512f", feature = "emulated"))]
             LaneWidth::W16 => $($pass)::+::<wide::f32x16>($($arg),*),
+            #[cfg(not(any(target_feature = "avx512f", feature = "emulated")))]
+            LaneWidth::W16 => unreachable!("widths are limited to those of the build"),
         }
     };
 }

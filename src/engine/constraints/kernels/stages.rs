@@ -40,10 +40,7 @@ macro_rules! over_segments {
 }
 pub(crate) use over_segments;
 
-/// Prefetch distance of records, in batches. With 150 000 contacts, whose records come from memory, sweeps
-/// take 2 to 5 times as long without prefetching, 5 % longer with a distance of two batches, and no longer
-/// with eight. Prefetching only if the records exceed a cache gains nothing for smaller sets, and costs soft
-/// sweeps 8 %.
+/// Prefetch distance of records, in batches, for records that come from memory.
 const PREFETCH_BATCHES: usize = 4;
 
 /// Visits each batch of a segment: `visit(rows, record, row_a, row_b)`.
@@ -125,9 +122,9 @@ impl<L: Lanes> PairState<L> {
 /// A kernel in stages: the work between gathering bodies and scattering them.
 pub(crate) trait Stages<L: Lanes, N: KernelFeatures, O: Opposite>: Copy {
     /// Data of a batch passed from one stage to the next, besides the bodies.
-    type Begun: Copy;
+    type Partial: Copy;
 
-    fn nothing() -> Self::Begun;
+    fn empty() -> Self::Partial;
 
     /// Forms the rows from the gathered bodies. The impulses in `state` have no meaning yet.
     fn begin(
@@ -136,11 +133,11 @@ pub(crate) trait Stages<L: Lanes, N: KernelFeatures, O: Opposite>: Copy {
         record: &mut [L],
         pushes_a: bool,
         state: &mut PairState<L>,
-        begun: &mut Self::Begun,
+        begun: &mut Self::Partial,
     );
 
     /// Solves the rows and sets the impulses.
-    fn solve(self, begun: &Self::Begun, record: &mut [L], state: &mut PairState<L>);
+    fn solve(self, begun: &Self::Partial, record: &mut [L], state: &mut PairState<L>);
 }
 
 /// Number of batches that go through the stages together.
@@ -162,7 +159,7 @@ where
     let pushes_a = segment.pushes_a();
     for_each_batch::<L, N, O, S>(rows, batches, segment, |rows, record, row_a, row_b| {
         let bodies = BodyPair::gather::<O, S>(rows, row_a, row_b);
-        let (mut state, mut begun) = (PairState::zero(), K::nothing());
+        let (mut state, mut begun) = (PairState::zero(), K::empty());
         state.read(&bodies);
         kernel.begin(&bodies, record, pushes_a, &mut state, &mut begun);
         kernel.solve(&begun, record, &mut state);
@@ -190,7 +187,7 @@ where
     if O::HAS_ROW {
         rows.assert_rows(row_a);
     }
-    let mut group = [(PairState::<L>::zero(), K::nothing()); GROUP];
+    let mut group = [(PairState::<L>::zero(), K::empty()); GROUP];
     for first in (0..segment.batches).step_by(GROUP) {
         let count = GROUP.min(segment.batches - first);
         let lanes = first * L::WIDTH..(first + count) * L::WIDTH;

@@ -169,10 +169,10 @@ pub trait ConstraintType: Any + fmt::Debug + Send {
     /// Appends the blocks of a constraint for the current state of the bodies, with the impulses of
     /// [`Self::impulses`]. For solvers that do not sweep; a constraint without blocks has no effect under
     /// those.
-    fn collect(&mut self, _constraint: usize, _on: Placed<'_>, _to: &mut Vec<RowBlock>) {}
+    fn collect(&mut self, _constraint: usize, _on: BodyStates<'_>, _to: &mut Vec<RowBlock>) {}
 
     /// Takes over the impulses of `blocks`, which come from [`Self::collect`].
-    fn replace(&mut self, _constraint: usize, _on: Placed<'_>, _blocks: &[RowBlock]) {}
+    fn replace(&mut self, _constraint: usize, _on: BodyStates<'_>, _blocks: &[RowBlock]) {}
 
     /// Number of rows in the rigid block of each constraint; 0 if it has none or more than one.
     fn rigid_size(&self) -> usize {
@@ -191,7 +191,7 @@ pub trait ConstraintType: Any + fmt::Debug + Send {
         false
     }
 
-    /// Sets the impulses of links. Records take them up in [`PassMode::TakeUp`].
+    /// Sets the impulses of links. Records take them up in [`PassMode::LoadDirectImpulses`].
     fn set_linked(&mut self, _impulses: &LinkImpulses) {}
 
     /// Accumulated impulses of a constraint (N·s or N·m·s), for inspection.
@@ -200,13 +200,13 @@ pub trait ConstraintType: Any + fmt::Debug + Send {
     }
 
     /// Impulses of a constraint in the last step, if they were recorded ([`PassMode::Book`]).
-    fn booked(&self, _constraint: usize) -> Option<Booked> {
+    fn booked(&self, _constraint: usize) -> Option<RecordedImpulses> {
         None
     }
 
     /// As [`Self::collect`], with the impulses of the whole last step if they were recorded
     /// ([`PassMode::Book`]), otherwise zeros.
-    fn collect_booked(&mut self, _constraint: usize, _on: Placed<'_>, _to: &mut Vec<RowBlock>) {}
+    fn collect_booked(&mut self, _constraint: usize, _on: BodyStates<'_>, _to: &mut Vec<RowBlock>) {}
 
     /// Relative angle of a constraint's bodies, counted across full turns (rad).
     fn angle(&self, _constraint: usize) -> f32 {
@@ -226,7 +226,7 @@ impl Clone for Box<dyn ConstraintType> {
 /// Impulses of a constraint on its bodies a and b in one step: `[N·s, N·s, N·m·s]` each, about their centers
 /// of mass.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Booked {
+pub struct RecordedImpulses {
     /// Sum of all impulses.
     pub all: [[f32; 3]; 2],
     /// The part due to springs and motors, which add and remove energy by design.
@@ -235,7 +235,7 @@ pub struct Booked {
 
 /// State of all bodies: one row and one pose at the start of the step for each, and an inert one at the end.
 #[derive(Clone, Copy, Debug)]
-pub struct Placed<'a> {
+pub struct BodyStates<'a> {
     /// Velocities, and displacements since the start of the step.
     pub rows: &'a [BodyRow],
     /// Poses at the start of the step.

@@ -79,11 +79,6 @@ const BATCH_COST: usize = 12;
 const STAGES_PER_LEVEL: u32 = 256;
 
 impl Assignment {
-    /// Discards all colors, so that the next call recomputes them even for the same contacts.
-    pub fn forget(&mut self) {
-        self.groups.iter_mut().for_each(|group| group.coloring.forget());
-    }
-
     /// Assigns lanes color by color, at the cheapest width within the two `widths`. Constraints without a
     /// color are solved one after the other.
     pub fn colored(
@@ -142,7 +137,7 @@ impl Assignment {
     }
 
     /// The width of the cheapest sweep. A batch of W lanes costs about 12 + W: its arithmetic costs the same
-    /// at every width, and its lanes are gathered one by one (measured on piles of 5 to 180 contacts).
+    /// at every width, and its lanes are gathered one by one.
     fn fitting(&self, [narrowest, widest]: [LaneWidth; 2]) -> LaneWidth {
         let cost = |width: LaneWidth| {
             let slots: usize = self.groups.iter().map(|g| g.coloring.lane_slots(width.lanes())).sum();

@@ -44,8 +44,8 @@ impl Passes<'_> {
     }
 
     /// Body pass: takes the turns of round bodies out of their rows, as the integration of positions does.
-    pub fn hide_turns(&mut self) {
-        self.over_bodies(Phase::Integrate, |rows, motion| motion.hide_turns(rows));
+    pub fn exclude_rotation_from_error(&mut self) {
+        self.over_bodies(Phase::Integrate, |rows, motion| motion.exclude_rotation_from_error(rows));
     }
 
     /// Builds the contact graph, and counts the other constraints of each body.

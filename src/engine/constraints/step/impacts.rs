@@ -3,7 +3,7 @@
 use super::{Passes, Workspace};
 use crate::clock::Phase;
 use crate::constraints::impacts::restitution::Rebound;
-use crate::constraints::impacts::spread::{self, Find, SpreadInput, VISITS};
+use crate::constraints::impacts::spread::{self, Find, PropagationInput, VISITS};
 use crate::constraints::impacts::{ImpactLaw, bias, restitution};
 use crate::constraints::kernels::pass::PassMode;
 use crate::constraints::records::batches::Part;
@@ -12,12 +12,12 @@ use crate::params::RESTITUTION_THRESHOLD;
 
 /// How impacts spread; see [`spread`].
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Spreading<'a> {
+pub(crate) struct ImpactWaves<'a> {
     /// Whether bodies bounce at the time of their impact instead of the beginning of the step.
     pub timed: bool,
     /// If set, points that do not bounce are stopped, except those of these bodies, which also stay where
     /// they are (`[bodies]`, or empty). If `None`, nothing is stopped.
-    pub stops: Option<&'a [bool]>,
+    pub inelastic_except: Option<&'a [bool]>,
     /// Whether to apply the loads that points carried until an impact released them.
     pub releases: bool,
     /// Limit of visits for each of the first points of an island; [`VISITS`] where time does not matter.
@@ -26,8 +26,8 @@ pub(crate) struct Spreading<'a> {
 
 impl Passes<'_> {
     /// Lets approaching points bounce or stop, before the step.
-    pub(crate) fn spread_impacts(&mut self, spreading: Spreading<'_>) {
-        let Spreading { timed, stops, releases, visits } = spreading;
+    pub(crate) fn spread_impacts(&mut self, spreading: ImpactWaves<'_>) {
+        let ImpactWaves { timed, inelastic_except, releases, visits } = spreading;
         let (h, dt, slop) = (self.h(), self.dt(), self.slop());
         let bounces = self.law() != ImpactLaw::None;
         if self.contacts.is_empty() {
@@ -41,10 +41,10 @@ impl Passes<'_> {
         let mut spread = std::mem::take(&mut self.work.impacts.spread);
         for (part, found) in [Part::Lanes, Part::Serial].into_iter().zip(spread.found()) {
             found.clear();
-            self.over_part(part, &mut Find { h, dt, least_gain, fastest, bounces, stops, found });
+            self.over_part(part, &mut Find { h, dt, least_gain, fastest, bounces, inelastic_except, found });
         }
         let Workspace { rows, lanes, serial, motion, .. } = &mut *self.work;
-        let done = spread.run(&mut SpreadInput {
+        let done = spread.run(&mut PropagationInput {
             rows,
             batches: [lanes, serial],
             contacts: self.contacts,
@@ -54,7 +54,7 @@ impl Passes<'_> {
             h,
             slop,
             timed,
-            joined: stops.unwrap_or_default(),
+            joined: inelastic_except.unwrap_or_default(),
             releases,
             visits,
             record_impulses: self.input.record_impulses,
@@ -63,7 +63,7 @@ impl Passes<'_> {
         if let Some([visits, cut]) = done {
             self.count.impact_visits += visits;
             self.count.cut_impacts += cut;
-            motion.hide_turns(rows);
+            motion.exclude_rotation_from_error(rows);
         }
         self.work.impacts.spread = spread;
     }
@@ -80,7 +80,12 @@ impl Passes<'_> {
                 self.begin_bounces(Rebound { threshold, only_new });
             }
             ImpactLaw::Waves => {
-                self.spread_impacts(Spreading { timed: false, stops: None, releases: true, visits: VISITS });
+                self.spread_impacts(ImpactWaves {
+                    timed: false,
+                    inelastic_except: None,
+                    releases: true,
+                    visits: VISITS,
+                });
             }
         }
     }

@@ -14,8 +14,8 @@ mod vectors;
 mod workspace;
 
 pub(crate) use drifts::Drifts;
-pub(crate) use impacts::Spreading;
-pub use solver::{Collision, CollisionScene, Schedule, Solver};
+pub(crate) use impacts::ImpactWaves;
+pub use solver::{CloneSolver, Collision, CollisionScene, Schedule, Solver};
 pub use workspace::{IterationObserver, StepInput, Watch, WorkCount, Workspace};
 
 use crate::clock::{Clock, Phase};

@@ -16,7 +16,7 @@ use std::fmt;
 ///
 /// The world calls the hooks in the order in which they are listed. Most solvers are a [`Schedule`] and
 /// nothing else.
-pub trait Solver: fmt::Debug + Send {
+pub trait Solver: CloneSolver + fmt::Debug + Send {
     /// Called before candidates are collided. The contacts are those of the last step.
     fn before_collision(&mut self, _scene: &mut CollisionScene<'_>, _collision: &mut Collision) {}
 
@@ -32,9 +32,18 @@ pub trait Solver: fmt::Debug + Send {
 
     /// All passes of one step.
     fn step(&mut self, passes: &mut Passes<'_>);
+}
 
-    /// A copy of the solver, with all data that it keeps.
+/// A copy of a solver, with all data that it keeps. Every solver that is `Clone` has it.
+pub trait CloneSolver {
+    /// The copy.
     fn boxed(&self) -> Box<dyn Solver>;
+}
+
+impl<S: Solver + Clone + 'static> CloneSolver for S {
+    fn boxed(&self) -> Box<dyn Solver> {
+        Box::new(self.clone())
+    }
 }
 
 impl Clone for Box<dyn Solver> {
@@ -107,9 +116,5 @@ impl fmt::Debug for Schedule {
 impl Solver for Schedule {
     fn step(&mut self, passes: &mut Passes<'_>) {
         (self.0)(passes);
-    }
-
-    fn boxed(&self) -> Box<dyn Solver> {
-        Box::new(*self)
     }
 }

@@ -56,7 +56,7 @@ impl Passes<'_> {
         }
         let Workspace { rows, types, poses, .. } = &mut *self.work;
         chains.find(types, rows);
-        chains.set_aside(types, poses);
+        chains.disable_rows(types, poses);
         if !chains.is_empty() && !self.contacts.is_empty() {
             let pairs = self.contacts.iter().map(|contact| [contact.body_a, contact.body_b]);
             let shared = chains.share_masses(types, rows, self.input.length_unit, pairs);
@@ -75,8 +75,8 @@ impl Passes<'_> {
 
     /// Body pass: notes the velocities of chains. Called before warm starts, which change them by the masses
     /// for contacts.
-    pub fn note_chains(&mut self, chains: &mut Chains) {
-        chains.note(&self.work.rows);
+    pub fn snapshot_chains(&mut self, chains: &mut Chains) {
+        chains.snapshot_velocities(&self.work.rows);
     }
 
     /// Pass over joints alone: solves the rigid rows of each chain of joints at once.
@@ -98,7 +98,7 @@ impl Passes<'_> {
             chains.give_impulses(&mut self.work.types);
             if self.input.record_impulses {
                 // Types defined by the caller treat this pass as a normal store.
-                self.over_types_alone(Phase::Store, PassMode::TakeUp);
+                self.over_types_alone(Phase::Store, PassMode::LoadDirectImpulses);
             }
             self.clock.lap(Phase::Relax);
         }

@@ -2,7 +2,7 @@
 
 use crate::clock::Phase;
 use crate::constraints::kernels::pass::PassMode;
-use crate::constraints::kernels::types::Placed;
+use crate::constraints::kernels::types::BodyStates;
 use crate::constraints::records::rows::{ROWS, RowBlock, RowLaw};
 use crate::constraints::vectors::system::System;
 
@@ -20,7 +20,7 @@ impl System<'_> {
     pub fn joint_blocks(&mut self) -> JointBlocks {
         self.over_types(Phase::Store, PassMode::InTurn);
         let mut all = JointBlocks::default();
-        let placed = Placed { rows: self.rows, poses: self.others.poses };
+        let placed = BodyStates { rows: self.rows, poses: self.others.poses };
         for (t, joined) in self.others.types.iter_mut().enumerate() {
             for i in 0..joined.kind.ends().len() {
                 all.joints.push([t, i, all.blocks.len()]);
@@ -33,7 +33,7 @@ impl System<'_> {
     /// Sets the impulses of the joints to those of the blocks. Velocities do not change.
     pub fn set_joint_impulses(&mut self, from: &JointBlocks) {
         let ends = from.joints.iter().skip(1).map(|joint| joint[2]).chain([from.blocks.len()]);
-        let placed = Placed { rows: self.rows, poses: self.others.poses };
+        let placed = BodyStates { rows: self.rows, poses: self.others.poses };
         for (&[t, i, first], end) in from.joints.iter().zip(ends) {
             self.others.types[t].kind.replace(i, placed, &from.blocks[first..end]);
         }

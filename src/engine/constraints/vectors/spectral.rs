@@ -65,7 +65,7 @@ impl ImpulseProblem {
     pub fn gradient(&self, system: &mut System<'_>, lambda: &mut PointVector, to: &mut PointVector) {
         system.lane_velocities(to);
         update([to], [&self.bias], |[g], [b]| [[g[0] + b[0], g[1]]]);
-        system.soften_lanes(to, lambda);
+        system.add_compliance_lanes(to, lambda);
     }
 
     /// The same, with zeros for impulses that do not change.
@@ -190,7 +190,7 @@ impl SpectralDescent {
             },
         );
         if system.has_joints() {
-            system.bound_lanes(next);
+            system.project_lanes(next);
             update([direction], [next, now], |_, [next, now]| [difference(next, now)]);
         }
         let way = sum_of_products([direction, &problem.mass], |[d, mass]| [d, quotient(d, mass)]);

@@ -139,20 +139,20 @@ impl<'a> System<'a> {
     }
 
     /// x ← x + R y for rows of joints, in lanes. Entries of contacts do not change.
-    pub fn soften_lanes(&mut self, x: &mut PointVector, y: &mut PointVector) {
-        self.over_others(VectorTask::Soften, Softness::RIGID, x, Some(y));
+    pub fn add_compliance_lanes(&mut self, x: &mut PointVector, y: &mut PointVector) {
+        self.over_others(VectorTask::AddCompliance, Softness::RIGID, x, Some(y));
     }
 
     /// x ← (1 + Y R)⁻¹ x for rows of joints, in lanes. Y is diagonal with the entries of `y`. Entries of
     /// contacts do not change.
-    pub fn yield_lanes(&mut self, x: &mut PointVector, y: &mut PointVector) {
-        self.over_others(VectorTask::Yield, Softness::RIGID, x, Some(y));
+    pub fn solve_compliance_lanes(&mut self, x: &mut PointVector, y: &mut PointVector) {
+        self.over_others(VectorTask::SolveCompliance, Softness::RIGID, x, Some(y));
     }
 
     /// Replaces impulses of joints by the nearest ones within their bounds, in lanes. Entries of contacts
     /// do not change.
-    pub fn bound_lanes(&mut self, x: &mut PointVector) {
-        self.over_others(VectorTask::Bound, Softness::RIGID, x, None);
+    pub fn project_lanes(&mut self, x: &mut PointVector) {
+        self.over_others(VectorTask::Project, Softness::RIGID, x, None);
     }
 
     /// Runs a pass between impulses of joints and vectors.

@@ -24,7 +24,7 @@
 
 use super::input::{DescentInput, PENALTY};
 use crate::constraints::joints::rows::{RowBlock, RowLaw};
-use crate::constraints::kernels::types::{Joined, Placed};
+use crate::constraints::kernels::types::{BodyStates, Joined};
 use crate::constraints::records::rows::ROWS;
 
 /// Numbers per row of a block.
@@ -72,7 +72,7 @@ impl JointDescent {
     }
 
     /// Lists the joints. Penalties are kept as long as the joints stay the same.
-    pub fn assign(&mut self, types: &mut [Joined], on: Placed<'_>) {
+    pub fn assign(&mut self, types: &mut [Joined], on: BodyStates<'_>) {
         self.places.clear();
         self.starts.clear();
         self.found.clear();
@@ -97,7 +97,7 @@ impl JointDescent {
     fn collect(&mut self, joint: usize, on: &mut DescentInput<'_>) -> std::ops::Range<usize> {
         let [t, i] = self.places[joint];
         self.found.clear();
-        let placed = Placed { rows: on.rows, poses: on.poses };
+        let placed = BodyStates { rows: on.rows, poses: on.poses };
         on.types[t as usize].kind.collect(i as usize, placed, &mut self.found);
         self.starts[joint] as usize..self.starts[joint + 1] as usize
     }
@@ -183,7 +183,7 @@ impl JointDescent {
             for (block, kept) in self.found.iter_mut().zip(&self.blocks[range]) {
                 block.impulses = kept.force.map(|force| on.h * force);
             }
-            let ([t, i], placed) = (self.places[joint], Placed { rows: on.rows, poses: on.poses });
+            let ([t, i], placed) = (self.places[joint], BodyStates { rows: on.rows, poses: on.poses });
             on.types[t as usize].kind.replace(i as usize, placed, &self.found);
         }
     }

@@ -28,7 +28,7 @@ pub(crate) struct Find<'a> {
     /// Whether contacts may bounce.
     pub bounces: bool,
     /// If non-bouncing points are stopped: marks the bodies that are exempt. `[bodies]`, or empty
-    pub stops: Option<&'a [bool]>,
+    pub inelastic_except: Option<&'a [bool]>,
     /// Lanes of the contacts that are hit, in order.
     pub found: &'a mut Vec<u32>,
 }
@@ -57,7 +57,7 @@ fn find<L: Lanes>(
     layout: &Layout,
     contacts: &[Contact],
     increments: &[[f32; 4]],
-    &mut Find { h, dt, least_gain, fastest, bounces, stops, ref mut found }: &mut Find<'_>,
+    &mut Find { h, dt, least_gain, fastest, bounces, inelastic_except, ref mut found }: &mut Find<'_>,
 ) {
     let between_dynamic = segment.pushes_a();
     let least = if between_dynamic && !bounces { 2.0 * FASTER * least_gain } else { SLOW * least_gain };
@@ -120,7 +120,7 @@ fn find<L: Lanes>(
             let hit = &contacts[contact.entries()[first + lane] as usize];
             let e = if bounces { hit.restitution } else { 0.0 };
             let is_stopped = speed > of(&stops_at, lane)
-                && stops.is_some_and(|joined| {
+                && inelastic_except.is_some_and(|joined| {
                     let is_joined = |body: u32| joined.get(body as usize) == Some(&true);
                     !is_joined(hit.body_a) && !is_joined(hit.body_b)
                 });

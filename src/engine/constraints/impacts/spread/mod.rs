@@ -54,7 +54,7 @@ use crate::constraints::impacts::touch::Round;
 use crate::disjoint::DisjointSets;
 pub(crate) use find::{Find, impact_speeds};
 use law::{lossy_impulses, rough_impulses};
-pub(crate) use point::SpreadInput;
+pub(crate) use point::PropagationInput;
 use point::{Body, HitPoint, Role, STILL};
 use std::collections::VecDeque;
 
@@ -89,7 +89,7 @@ const DEEPER: f32 = 0.1;
 
 /// Solves impacts; keeps its memory from step to step.
 #[derive(Clone, Debug, Default)]
-pub struct Spread {
+pub struct ImpactPropagation {
     /// Lanes that are hit, of the colored batches and of the serial ones. `hit` has those of both, by island.
     found: [Vec<u32>; 2],
     hit: Vec<(u32, u32)>,
@@ -116,7 +116,7 @@ pub struct Spread {
     slowest: f32,
 }
 
-impl Spread {
+impl ImpactPropagation {
     /// Where [`find`] writes what it finds.
     pub(crate) fn found(&mut self) -> &mut [Vec<u32>; 2] {
         &mut self.found
@@ -124,7 +124,7 @@ impl Spread {
 
     /// Solves the impacts of the lanes that were found, island by island. Returns the number of visits and of
     /// islands that reached their bound; `None` if no impacts occurred.
-    pub(crate) fn run(&mut self, on: &mut SpreadInput<'_>) -> Option<[usize; 2]> {
+    pub(crate) fn run(&mut self, on: &mut PropagationInput<'_>) -> Option<[usize; 2]> {
         if self.found.iter().all(Vec::is_empty) {
             return None;
         }
@@ -163,7 +163,7 @@ impl Spread {
     }
 
     /// Solves the impacts of an island. Returns false if it reached its bound.
-    fn island(&mut self, on: &mut SpreadInput<'_>, hit: std::ops::Range<usize>) -> bool {
+    fn island(&mut self, on: &mut PropagationInput<'_>, hit: std::ops::Range<usize>) -> bool {
         (self.first, self.visits) = (self.points.len(), 0);
         self.pushed.clear();
         for i in hit {
@@ -206,7 +206,7 @@ impl Spread {
     }
 
     /// Cancels the displacement of bodies that have a point, visited or not, that would end deeper.
-    fn stay(&mut self, on: &mut SpreadInput<'_>) {
+    fn stay(&mut self, on: &mut PropagationInput<'_>) {
         let deeper = DEEPER * on.slop;
         for i in 0..self.pushed.len() {
             let mut end = self.bodies[self.pushed[i] as usize].first;
@@ -227,7 +227,7 @@ impl Spread {
     }
 
     /// Finds the points that bounce in this wave. Returns whether there are any.
-    fn begin_wave(&mut self, on: &mut SpreadInput<'_>, is_first: bool, bounces: bool) -> bool {
+    fn begin_wave(&mut self, on: &mut PropagationInput<'_>, is_first: bool, bounces: bool) -> bool {
         let mut any = false;
         for place in self.first..self.points.len() {
             let point = &mut self.points[place];
@@ -270,10 +270,10 @@ impl Spread {
     ///
     /// A block that rocks stands on one corner until the other one is hit. Its load F of the step before belongs to the first
     /// corner until t, and in the step that is solved from its beginning on, all of it goes to the second: an error of F t
-    /// times the distance of both, which takes 3 % of the spin of a block 8 m high. So a point that an impact releases, which
+    /// times the distance of both. So a point that an impact releases, which
     /// is one that leaves faster than its load can bring it back within the step, gives F t beside the impact (for t < 0 it has
     /// borne too long, and takes it back from what does not move). A force in [0, t] moves bodies by F t (dt − t/2)/m in the step.
-    fn release(&mut self, on: &mut SpreadInput<'_>) -> bool {
+    fn release(&mut self, on: &mut PropagationInput<'_>) -> bool {
         let mut any = false;
         for place in self.first..self.points.len() {
             let point = self.points[place];
@@ -305,7 +305,7 @@ impl Spread {
 
     /// Visits the points of pushed bodies until none is left or the bound is reached. Returns whether none is
     /// left.
-    fn spread(&mut self, on: &mut SpreadInput<'_>, bounces: bool) -> bool {
+    fn spread(&mut self, on: &mut PropagationInput<'_>, bounces: bool) -> bool {
         let mut is_done = true;
         while let Some(body) = self.queue.pop_front() {
             self.bodies[body as usize].is_queued = false;
@@ -329,7 +329,7 @@ impl Spread {
 
     /// Solves both normal impulses of a contact together, if both are positive and alternating visits would
     /// converge slowly.
-    fn visit_both(&mut self, on: &mut SpreadInput<'_>, first: usize) {
+    fn visit_both(&mut self, on: &mut PropagationInput<'_>, first: usize) {
         let pushes = |p: &HitPoint| p.impulse[0] > 0.0 && matches!(p.role, Role::Stops | Role::Bounces);
         if !self.points[first].is_tight || !self.points[first..first + 2].iter().all(pushes) {
             return;
@@ -351,7 +351,7 @@ impl Spread {
     }
 
     /// Moves a point to the middle between the positions of its bodies at the time of its impact.
-    fn meet(&mut self, on: &SpreadInput<'_>, place: usize) {
+    fn meet(&mut self, on: &PropagationInput<'_>, place: usize) {
         if on.timed {
             let point = &mut self.points[place];
             for row in point.rows {
@@ -365,7 +365,7 @@ impl Spread {
     }
 
     /// Solves a point, if it approaches fast enough or was hit before.
-    fn visit(&mut self, on: &mut SpreadInput<'_>, place: usize, bounces: bool) {
+    fn visit(&mut self, on: &mut PropagationInput<'_>, place: usize, bounces: bool) {
         let point = &mut self.points[place];
         if !point.exists || point.role == Role::Left && bounces {
             return;
@@ -415,7 +415,7 @@ impl Spread {
     }
 
     /// Changes the impulses of a point (N·s), at the time of its impact.
-    fn change(&mut self, on: &mut SpreadInput<'_>, place: usize, new: [f32; 2]) {
+    fn change(&mut self, on: &mut PropagationInput<'_>, place: usize, new: [f32; 2]) {
         let point = &mut self.points[place];
         let delta = [new[0] - point.impulse[0], new[1] - point.impulse[1]];
         point.given = [point.given[0] + delta[0], point.given[1] + delta[1]];
@@ -426,7 +426,7 @@ impl Spread {
 
     /// Applies an impulse (N·s) to both bodies of a point and queues them. The impulse acts until `time` (s),
     /// and at `at` (s) on average.
-    fn push(&mut self, on: &mut SpreadInput<'_>, place: usize, impulse: [f32; 2], [at, time]: [f32; 2]) {
+    fn push(&mut self, on: &mut PropagationInput<'_>, place: usize, impulse: [f32; 2], [at, time]: [f32; 2]) {
         let point = &self.points[place];
         for (row, is_pushed) in point.rows.into_iter().zip([point.pushes_a, true]) {
             if !is_pushed {
@@ -445,7 +445,7 @@ impl Spread {
     }
 
     /// Links the ends of each body, and joins bodies in contact into islands.
-    fn link(&mut self, on: &SpreadInput<'_>) {
+    fn link(&mut self, on: &PropagationInput<'_>) {
         let (count, lanes) = (on.rows.len(), on.batches[0].lanes() + on.batches[1].lanes());
         self.bodies.clear();
         self.bodies.resize(count, STILL);
@@ -474,14 +474,14 @@ impl Spread {
     }
 
     /// The body that represents the island of a lane.
-    fn island_of(&mut self, on: &SpreadInput<'_>, lane: u32) -> u32 {
+    fn island_of(&mut self, on: &PropagationInput<'_>, lane: u32) -> u32 {
         let (part, of) = on.part_of(lane);
         // Body b is dynamic.
         self.islands.least(on.batches[part].row_b()[of])
     }
 
     /// Index of the first point of a lane. Adds the points of the lane to the list if they are not in it.
-    fn list(&mut self, on: &SpreadInput<'_>, lane: u32) -> usize {
+    fn list(&mut self, on: &PropagationInput<'_>, lane: u32) -> usize {
         let (first, listed) = (self.points.len(), &mut self.listed[lane as usize]);
         if *listed == NONE {
             *listed = first as u32;
@@ -497,7 +497,7 @@ impl Spread {
 }
 
 /// Time (s) at which a point that approaches faster than `slowest` (m/s) closes its gap, if within the step.
-fn arrival(point: &HitPoint, on: &SpreadInput<'_>, slowest: f32) -> Option<f32> {
+fn arrival(point: &HitPoint, on: &PropagationInput<'_>, slowest: f32) -> Option<f32> {
     let [vn, _] = point.velocity(on.rows);
     if vn >= -slowest {
         return None;
@@ -507,13 +507,13 @@ fn arrival(point: &HitPoint, on: &SpreadInput<'_>, slowest: f32) -> Option<f32> 
 }
 
 /// Whether a point approaches fast enough to bounce.
-fn will_bounce(point: &HitPoint, on: &SpreadInput<'_>) -> bool {
+fn will_bounce(point: &HitPoint, on: &PropagationInput<'_>) -> bool {
     let speed = -point.velocity(on.rows)[0];
     speed > point.slow && on.restitution(point) * speed > BOUNCES * point.slow
 }
 
 /// Rebound velocity of an approaching point (m/s), and the time of its impact (s); see the [module](self).
-fn rebounds(point: &HitPoint, on: &SpreadInput<'_>, is_first: bool) -> Option<[f32; 2]> {
+fn rebounds(point: &HitPoint, on: &PropagationInput<'_>, is_first: bool) -> Option<[f32; 2]> {
     if !will_bounce(point, on) {
         return None;
     }

@@ -81,8 +81,8 @@ pub(super) struct HitPoint {
     pub is_tight: bool,
 }
 
-/// The data that [`super::Spread::run`] works on.
-pub(crate) struct SpreadInput<'a> {
+/// The data that [`super::ImpactPropagation::run`] works on.
+pub(crate) struct PropagationInput<'a> {
     pub rows: &'a mut [BodyRow],
     /// Colored batches, serial ones.
     pub batches: [&'a mut Batches; 2],
@@ -123,7 +123,7 @@ pub(super) struct LanePlace {
 
 const _: () = assert!(size_of::<HitPoint>() == 128);
 
-impl SpreadInput<'_> {
+impl PropagationInput<'_> {
     /// Which batches a lane is in, and its lane in these.
     pub(super) fn part_of(&self, lane: u32) -> (usize, usize) {
         let (lane, lanes) = (lane as usize, self.batches[0].lanes());

@@ -166,7 +166,7 @@ impl Chains {
     }
 
     /// Marks the joints that are links in their types, so that sweeps skip their rigid rows.
-    pub fn set_aside(&self, types: &mut [Joined], poses: &[PoseRow]) {
+    pub fn disable_rows(&self, types: &mut [Joined], poses: &[PoseRow]) {
         for (joined, links) in types.iter_mut().zip(&self.links) {
             joined.kind.link(links, poses);
         }
@@ -191,24 +191,24 @@ impl Chains {
         pairs.chain(others.copied()).flatten().for_each(|body| self.loaded[body as usize] = true);
         self.write_rows(types, rows, LinkRule { inv_h: 0.0, length_unit });
         self.system.find_shares(&self.loaded, &mut self.shares);
-        self.lends().then_some((&mut self.masses, &self.shares))
+        self.has_effective_mass_scaling().then_some((&mut self.masses, &self.shares))
     }
 
     /// Whether some bodies have apparent masses for contacts.
-    pub fn lends(&self) -> bool {
-        self.system.lends()
+    pub fn has_effective_mass_scaling(&self) -> bool {
+        self.system.has_effective_mass_scaling()
     }
 
     /// Notes velocities before warm starts, if some bodies have apparent masses.
-    pub fn note(&mut self, rows: &[BodyRow]) {
-        if self.lends() {
+    pub fn snapshot_velocities(&mut self, rows: &[BodyRow]) {
+        if self.has_effective_mass_scaling() {
             self.system.note(rows);
         }
     }
 
     /// Restores the masses of bodies.
     pub fn restore_masses(&mut self, rows: &mut [BodyRow]) {
-        if self.lends() {
+        if self.has_effective_mass_scaling() {
             self.masses.scale(rows, |_| 1.0);
             self.masses.forget();
             self.system.forget_shares();
@@ -238,7 +238,7 @@ impl Chains {
                 return false;
             }
         }
-        if self.lends() {
+        if self.has_effective_mass_scaling() {
             self.system.push_masses(rows);
         }
         if stage == ChainStage::Begin {

@@ -173,7 +173,7 @@ impl<T: JointType> Joints<T> {
     }
 
     /// Copies the impulses of the rigid rows of links to the records.
-    pub(crate) fn take_up<L: Lanes>(&self, on: TypeInput<'_>) {
+    pub(crate) fn load_direct_impulses<L: Lanes>(&self, on: TypeInput<'_>) {
         let Some([place, rows]) = self.rigid.filter(|_| self.linked.is_active()) else { return };
         let (first, stride, kept) = (self.first_kept() + place, self.stride(), T::kept(self.form));
         for i in 0..on.batches.visits().len() {
@@ -247,8 +247,7 @@ impl JointPass<f32x8> for LinkPass<'_> {
         let (way, inv_h, unit) = (*way, f32x8::splat(by.inv_h), f32x8::splat(by.length_unit));
         let most = f32x8::splat(MOST_SPEED) * unit;
         let is_link = way * way;
-        // Selected by products: for selections, the compiler makes masked stores, which took more than half
-        // of this pass on Zen.
+        // Selected by products: for selections, the compiler makes masked stores, which are slow.
         let others = f32x8::ONE - is_link;
         let set = |to: &mut f32x8, value: f32x8| *to = Lanes::mul_add(is_link, value, others * *to);
         let square = error.iter().zip(&j).fold(f32x8::ZERO, |sum, (&x, j)| {

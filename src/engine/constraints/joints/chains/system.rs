@@ -30,9 +30,7 @@
 //! moves nothing, or is not in use, has 1 on the diagonal and no impulse.
 //!
 //! A link of two rows takes about 110 multiplications, eight of them at a time. The longest chain of
-//! dependent operations is m inverses of D. A bridge of 160 links takes 1 µs per substep, and 0.8 µs for its
-//! rows, 11 ns per link (AVX2). In `f64`, its steps take 1.7 times as long, and the only gain is the last
-//! tenth of a micrometer.
+//! dependent operations is m inverses of D.
 
 mod apparent;
 mod blocks;
@@ -279,7 +277,7 @@ impl ChainSystem {
     }
 
     fn solve_rows<const N: usize>(&mut self, rows: &mut [BodyRow], stage: ChainStage) {
-        if self.lends() {
+        if self.has_effective_mass_scaling() {
             self.take_whole_masses();
         }
         if self.any_slowed {

@@ -89,9 +89,9 @@ struct InBlocks<R, const NORMAL_FIRST: bool> {
     rule: R,
 }
 
-/// See [`Stages::Begun`].
+/// See [`Stages::Partial`].
 #[derive(Clone, Copy)]
-struct BegunBlock<L> {
+struct PartialBlock<L> {
     /// c (N·s), s (kg) and v (m/s) of the normal rows.
     constant: [L; 2],
     slope: [L; 2],
@@ -143,12 +143,12 @@ where
     O: Opposite,
     R: NormalRule,
 {
-    type Begun = BegunBlock<L>;
+    type Partial = PartialBlock<L>;
 
     #[inline(always)]
-    fn nothing() -> BegunBlock<L> {
+    fn empty() -> PartialBlock<L> {
         let pair = [L::zero(); 2];
-        BegunBlock { constant: pair, slope: pair, velocity: pair, friction: pair }
+        PartialBlock { constant: pair, slope: pair, velocity: pair, friction: pair }
     }
 
     #[inline(always)]
@@ -158,7 +158,7 @@ where
         record: &mut [L],
         pushes_a: bool,
         state: &mut PairState<L>,
-        begun: &mut BegunBlock<L>,
+        begun: &mut PartialBlock<L>,
     ) {
         let layout = const { Layout::of::<N, O>() };
         let has_friction = const { N::FRICTION && R::FRICTION };
@@ -208,7 +208,7 @@ where
     }
 
     #[inline(always)]
-    fn solve(self, begun: &BegunBlock<L>, record: &mut [L], state: &mut PairState<L>) {
+    fn solve(self, begun: &PartialBlock<L>, record: &mut [L], state: &mut PairState<L>) {
         let layout = const { Layout::of::<N, O>() };
         let friction_last = const { N::FRICTION && R::FRICTION && NORMAL_FIRST };
         let inertia = state.inertia;
@@ -242,7 +242,7 @@ where
             spin::<L, N, O>(&mut state.w, inertia, arm[p], delta);
             if friction_last {
                 for q in 0..N::POINTS {
-                    tangent.answer::<N, O>(q, L::zero(), inertia, arm[p], delta);
+                    tangent.propagate_delta::<N, O>(q, L::zero(), inertia, arm[p], delta);
                 }
             }
         }

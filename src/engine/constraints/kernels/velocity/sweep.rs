@@ -11,43 +11,22 @@
 //!
 //! with the arms A = r × u. So Gauss–Seidel over the rows needs no body. Each row stores its unclamped
 //! impulse at the current velocity, λ_q = c_q − s_q v_q, and each earlier row subtracts s_q k_pq δ_p from it.
-//! One row then depends on the previous one through only one multiply-add, one clamp and one difference. This
-//! is 12 % faster than updating `along_n`, `along_t`, ω_a and ω_b after each row (6 % with k only between
-//! points). The k are formed in registers.
+//! One row then depends on the previous one through only one multiply-add, one clamp and one difference. The
+//! k are formed in registers.
 //!
-//! # Floor, and how far from it
+//! # What bounds it
 //!
-//! Case: two points with friction against a dynamic body, 16 lanes, one Zen 5 core (AVX-512) at up to 3.8
-//! GHz. A contact reads 92 bytes and writes 16. A batch is about 430 instructions (relaxing; 470 with soft
-//! contacts), of which 104 shuffle body rows and 110 to 130 are arithmetic. Issued at 8 per cycle, these take
-//! 0.9 to 1.0 ns per contact. 92 bytes take 0.9 ns at the 100 GB/s of the third-level cache and 2.5 ns at the
-//! 37 GB/s of memory. Measured, soft and relaxing: 2.3 and 2.2 ns with 1 300 contacts, 2.4 and 2.3 with
-//! 15 000, 2.9 and 2.7 with 150 000. So with 150 000 contacts memory bandwidth is nearly the bound. With
-//! fewer the kernel takes 2.4 times its lower bound: a batch fills the out-of-order window, so that the chain
-//! from a row's load through four clamps to its store overlaps little with the next batch. A shorter chain
-//! and fewer instructions help; fewer bytes do not.
-//!
-//! With 16 registers (AVX2, `x86-64-v3`), eight lanes, relaxing: a batch is 412 instructions instead of 349
-//! with 32 registers. Of these, 39 store to the stack instead of 8, 28 load from it instead of 3, and 30 have
-//! an operand in it instead of 6; the 72 shuffles and some 120 arithmetic instructions are the same. On the
-//! same core this takes 11 % longer, soft contacts 15 %. An unlucky placement of the stack cost more than
-//! that (`align_frame`). The remedy is [`crate::constraints::kernels::stages`].
-//!
-//! Tried without gain, before stages: storing the coupling k in the record (53 instructions fewer; −5 and
-//! −3 %, preparing +18 %); friction rows that wait for the spins (41 fewer; −3 and −2 %); rereading records
-//! instead of keeping them on the stack (0 and −1 %); and a barrier that keeps an inverse mass in one
-//! register instead of the two that it is shuffled from (0, −2 %).
+//! A contact of two points with friction reads 92 bytes and writes 16. From memory, bandwidth is nearly the
+//! bound. From a cache, a batch fills the out-of-order window, so that the chain from a row's load through
+//! four clamps to its store overlaps little with the next batch. A shorter chain and fewer instructions help;
+//! fewer bytes do not. With 16 registers (AVX2), batches also spill; see
+//! [`crate::constraints::kernels::stages`].
 //!
 //! # Order of rows
 //!
 //! Both normal rows, then both friction rows. Point by point (normal, friction, normal, friction) costs the
-//! same and converges faster: on a pyramid of base 20 by 0.9967 instead of 0.9974 per sweep, and `soft_step`
-//! left 1.4 µm/s instead of 313 on `pyramid:40`. But then the first friction row reacts to a spin that the
-//! second normal row would have removed: boxes wander sideways, a box on an incline drifts (A1.stick, A1.slip
-//! fail), and a pile under `pgs` falls (B3.pile). More in `papers/solver2d.md`.
-//!
-//! Tried without gain: row indices premultiplied for the addressing mode (32 instructions fewer, relaxing
-//! −3 %, soft 0 %; unless prevented, the compiler then forms addresses in vectors, +20 %).
+//! same and converges faster. But then the first friction row reacts to a spin that the second normal row
+//! would have removed: boxes wander sideways, and a box on an incline drifts. More in `papers/solver2d.md`.
 //!
 //! Sources: `catto2006` (sequential impulses, accumulated clamping), `catto2024simd` (gather, solve, scatter
 //! by color); the contact frame is this crate's own.
@@ -209,7 +188,7 @@ impl<L: Lanes> Rows<L> {
     /// Updates row `q` for the impulse `delta` at a row with arms `from`. `direct` is the part of k that does
     /// not involve rotation.
     #[inline(always)]
-    pub(crate) fn answer<N: KernelFeatures, O: Opposite>(
+    pub(crate) fn propagate_delta<N: KernelFeatures, O: Opposite>(
         &mut self,
         q: usize,
         direct: L,
@@ -263,7 +242,7 @@ impl<L: Lanes> Rows<L> {
             self.sum = self.sum + delta;
             let arm = self.arm[p];
             for q in p + 1..N::POINTS {
-                self.answer::<N, O>(q, mass_sum, inertia, arm, delta);
+                self.propagate_delta::<N, O>(q, mass_sum, inertia, arm, delta);
             }
             spin::<L, N, O>(&mut state.w, inertia, arm, delta);
         }
@@ -288,9 +267,9 @@ pub(crate) fn unbounded_friction<L: Lanes, R: NormalRule>(
 #[derive(Clone, Copy)]
 struct RowByRow<R>(R);
 
-/// See [`Stages::Begun`].
+/// See [`Stages::Partial`].
 #[derive(Clone, Copy)]
-struct BegunPoints<L> {
+struct PartialPoints<L> {
     /// sin Δθ and 1 − cos Δθ of a and b; used only if arms turn.
     turn: [[L; 2]; 2],
     /// s of the normal rows: impulse per unit of velocity (kg).
@@ -299,7 +278,7 @@ struct BegunPoints<L> {
     impulse: [[L; 2]; 2],
 }
 
-impl<L: Lanes> BegunPoints<L> {
+impl<L: Lanes> PartialPoints<L> {
     /// Arms of bodies a and b at point `p` along n and along t, turned if the rule requires it.
     #[inline(always)]
     fn arms<N: KernelFeatures, O: Opposite, R: NormalRule>(&self, record: &[L], p: usize) -> [[L; 2]; 2] {
@@ -310,12 +289,12 @@ impl<L: Lanes> BegunPoints<L> {
 }
 
 impl<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule> Stages<L, N, O> for RowByRow<R> {
-    type Begun = BegunPoints<L>;
+    type Partial = PartialPoints<L>;
 
     #[inline(always)]
-    fn nothing() -> BegunPoints<L> {
+    fn empty() -> PartialPoints<L> {
         let pair = [L::zero(); 2];
-        BegunPoints { turn: [pair; 2], slope: pair, impulse: [pair; 2] }
+        PartialPoints { turn: [pair; 2], slope: pair, impulse: [pair; 2] }
     }
 
     #[inline(always)]
@@ -325,7 +304,7 @@ impl<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule> Stages<L, N, O> fo
         record: &mut [L],
         pushes_a: bool,
         state: &mut PairState<L>,
-        begun: &mut BegunPoints<L>,
+        begun: &mut PartialPoints<L>,
     ) {
         let (layout, rule) = (const { Layout::of::<N, O>() }, self.0);
         let [along_n, along_t] = state.along::<O>(record);
@@ -355,7 +334,7 @@ impl<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule> Stages<L, N, O> fo
     }
 
     #[inline(always)]
-    fn solve(self, begun: &BegunPoints<L>, record: &mut [L], state: &mut PairState<L>) {
+    fn solve(self, begun: &PartialPoints<L>, record: &mut [L], state: &mut PairState<L>) {
         let layout = const { Layout::of::<N, O>() };
         let friction_rows = const { N::FRICTION && R::FRICTION };
         let (mut normal, mut tangent) = (Rows::<L>::new(), Rows::<L>::new());
@@ -378,11 +357,11 @@ impl<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule> Stages<L, N, O> fo
             normal.sum = normal.sum + delta;
             let arm = normal.arm[p];
             for q in p + 1..N::POINTS {
-                normal.answer::<N, O>(q, mass_sum, inertia, arm, delta);
+                normal.propagate_delta::<N, O>(q, mass_sum, inertia, arm, delta);
             }
             if friction_rows {
                 for q in 0..N::POINTS {
-                    tangent.answer::<N, O>(q, L::zero(), inertia, arm, delta);
+                    tangent.propagate_delta::<N, O>(q, L::zero(), inertia, arm, delta);
                 }
             }
             spin::<L, N, O>(&mut state.w, inertia, arm, delta);

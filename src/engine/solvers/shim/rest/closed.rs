@@ -13,8 +13,7 @@
 //!
 //! As long as it is not, the load of a slow contact is at most the force of its spring. Loads that squeeze a body
 //! between others have no single solution. Those of a landing, which loads start from, may be many times what the
-//! springs bear afterwards, and preload for them would wedge the body: a plug dropped into a taper of 1° was pressed by
-//! 48 instead of 24 times its weight.
+//! springs bear afterwards, and preload for them would wedge the body.
 //!
 //! The part of the impulses for which springs are not shortened is the part that statics does not explain.
 

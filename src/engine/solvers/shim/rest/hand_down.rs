@@ -29,7 +29,7 @@ const ALIKE: f32 = 0.99;
 
 /// Hands loads down; keeps its memory from call to call.
 #[derive(Clone, Debug, Default)]
-pub(in super::super) struct HandDown {
+pub(in super::super) struct PropagateLoads {
     /// Contacts that hand loads down.
     upright: Below,
     /// Contacts of bodies that `upright` does not connect with the ground.
@@ -72,7 +72,7 @@ impl Below {
     }
 }
 
-/// The data that [`HandDown::run`] works on.
+/// The data that [`PropagateLoads::run`] works on.
 pub(in super::super) struct HandDownInput<'a> {
     /// All contacts.
     pub contacts: &'a [Contact],
@@ -86,7 +86,7 @@ pub(in super::super) struct HandDownInput<'a> {
     pub h: f32,
 }
 
-impl HandDown {
+impl PropagateLoads {
     /// Whether the graphs are those of other contacts: normals have turned. A graph that lasted until contacts anywhere in the
     /// world come or go would make a pile depend on another.
     pub fn is_stale(&self, contacts: &[Contact], gravity: Vec2) -> bool {

@@ -50,10 +50,10 @@ use crate::lanes::BodyRow;
 pub(super) const PER_CONTACT: usize = 8;
 
 /// See [`PER_CONTACT`].
-pub(super) const CALM: usize = 4;
+pub(super) const REST_TIME: usize = 4;
 
 /// See [`PER_CONTACT`].
-pub(super) const BORNE: usize = 6;
+pub(super) const PRELOAD: usize = 6;
 
 /// Index in the fields of a body of the value that is 1 if it has a joint.
 const JOINED: usize = 4;
@@ -90,6 +90,6 @@ impl Shim {
         for _ in 0..load_sweeps {
             passes.over_contacts(&mut loads::LoadSweep { fields, h });
         }
-        passes.over_contacts(&mut shorten::Shorten { springs, h, dt, rises, once });
+        passes.over_contacts(&mut shorten::ApplyPreload { springs, h, dt, rises, once });
     }
 }

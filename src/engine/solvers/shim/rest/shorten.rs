@@ -72,7 +72,7 @@ use crate::lanes::{LaneIndex, Lanes, Quad, prefetch_quad};
 
 /// See the [module](self).
 #[derive(Clone, Copy, Debug)]
-pub(in super::super) struct Shorten {
+pub(in super::super) struct ApplyPreload {
     /// The springs.
     pub springs: Soft,
     /// Substep (s).
@@ -94,7 +94,7 @@ const RISE: f32 = 3.0;
 /// Prefetch distance of contacts (batches).
 const AHEAD: usize = 3;
 
-impl Pass for Shorten {
+impl Pass for ApplyPreload {
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         on.batches.each_segment(F::layout, |batches, segment, layout| {
             shorten::<L>(batches, segment, layout, on.kept.contacts(), self);
@@ -108,7 +108,7 @@ fn shorten<L: Lanes>(
     segment: &Segment,
     layout: &Layout,
     kept: &mut [f32],
-    &Shorten { springs, h, dt, rises, once }: &Shorten,
+    &ApplyPreload { springs, h, dt, rises, once }: &ApplyPreload,
 ) {
     let Softness { bias_rate, mass_scale, impulse_scale } = match segment.opposite {
         OppositeKind::Dynamic => springs.dynamic,

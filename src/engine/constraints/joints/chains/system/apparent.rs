@@ -126,7 +126,7 @@ impl ChainSystem {
     }
 
     /// Whether some body has less than its whole inverse mass for contacts.
-    pub fn lends(&self) -> bool {
+    pub fn has_effective_mass_scaling(&self) -> bool {
         self.apparent.lends
     }
 

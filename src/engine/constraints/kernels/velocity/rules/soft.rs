@@ -99,8 +99,7 @@ impl Soft {
 }
 
 impl NormalRule for Soft {
-    // Solving friction only in the relaxing sweep saves a fifth of a step and costs accuracy: a box on an
-    // incline then creeps 10 times as far, and a sliding box is off by 4 % instead of 0.9 %.
+    // Solving friction only in the relaxing sweep would let boxes on inclines creep.
     const FRICTION: bool = true;
 
     fn of_errors(&self) -> Softness {
