@@ -91,6 +91,7 @@
 //! units  estimate                human-readable numbers; what a run will take
 //! reference  metrics             certified solutions; errors read from states
 //! scenes  capture  picture       what is simulated, and its known truth; frozen problems; frames drawn
+//! trial                          one run to its verdict
 //! recording                      whole runs in a file, and the page that plays them
 //! study  converge  verify        solver × scene × budget; iterations to a tolerance; hard cases
 //! advise  report                 the cheapest setting; tables, plots, records
@@ -123,6 +124,7 @@ pub mod report;
 pub mod scenes;
 pub mod study;
 pub mod torture;
+pub mod trial;
 #[doc(hidden)]
 pub mod units;
 pub mod verify;

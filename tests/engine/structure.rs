@@ -84,6 +84,7 @@ const LAB: &[&[&str]] = &[
     &["reference"],
     &["metrics"],
     &["scenes", "capture", "picture"],
+    &["trial"],
     &["recording"],
     &["verify", "study", "converge"],
     &["advise", "report"],

@@ -526,7 +526,7 @@ mod tests {
     #[test]
     fn what_falls_later_stands_beside_the_winner_with_its_step() {
         let later = |mark: bool| {
-            let broken = mark.then_some(Broken { mark: Mark::Fell, step: 800 });
+            let broken = mark.then_some(Broken { mark: Mark::Fell, step: 800, body: None });
             Some(Later { steps: 3600, seconds: 60.0, broken, rest_speed_m_s: None })
         };
         let records = [

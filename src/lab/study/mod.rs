@@ -48,12 +48,13 @@ use crate::engine::constraints::Impacts;
 use crate::engine::lanes::LaneWidth;
 use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::{VARIANTS, Variant, find};
-use crate::engine::world::{Criterion, Divergence, Order, Quantity, Settings, World};
+use crate::engine::world::{Criterion, Divergence, Order, Quantity, Settings};
 use crate::lab::error::Error;
-use crate::lab::metrics::{Errors, Observation};
+use crate::lab::metrics::Errors;
 use crate::lab::overrides;
-use crate::lab::scenes::holds::{Broken, HoldWatch};
+use crate::lab::scenes::holds::Broken;
 use crate::lab::scenes::{Loaded, Scene};
+use crate::lab::trial::{Trial, TrialOutcome};
 use compare::Ratio;
 use found::TunedBudget;
 use interleave::Interleaved;
@@ -294,61 +295,42 @@ fn error_run(plan: &StudyPlan, cell: &ErrorCell, order: Order, timed: u32) -> Re
 }
 
 /// Runs a scene to its end and measures its errors. The hash is taken after step `hash_at`.
-pub fn observe(loaded: Loaded, settings: Settings, hash_at: u32) -> Result<RunOutcome, Error> {
-    observe_while(loaded, settings, hash_at, &|_, _| true)
+pub fn observe(mut loaded: Loaded, settings: Settings, hash_at: u32) -> Result<RunOutcome, Error> {
+    let settings = Settings { record_impulses: true, observe_rule: true, ..settings };
+    let mut hash = 0;
+    let found = Trial::of(&mut loaded, settings).run(&mut |world| {
+        if world.step_index == u64::from(hash_at) {
+            hash = world.state_hash();
+        }
+        Ok(())
+    })?;
+    Ok(RunOutcome::new(found, hash))
 }
 
 /// The same up to the first violated requirement. Also returns the work of an average step: its sweeps and
 /// substeps.
-fn observe_until_broken(loaded: Loaded, settings: Settings) -> Result<(RunOutcome, f64), Error> {
-    let (steps, work) = (std::cell::Cell::new(0.0), std::cell::Cell::new(0.0));
+fn observe_until_broken(mut loaded: Loaded, settings: Settings) -> Result<(RunOutcome, f64), Error> {
+    let settings = Settings { record_impulses: true, observe_rule: true, ..settings };
     let substeps = f64::from(settings.budget.substeps);
-    let outcome = observe_while(loaded, settings, 0, &|world, watch| {
-        steps.set(steps.get() + 1.0);
-        work.set(work.get() + world.counts.sweeps as f64 + substeps);
-        watch.broken().is_none()
+    let (mut steps, mut sweeps) = (0_u64, 0);
+    let trial = Trial { until_broken: true, ..Trial::of(&mut loaded, settings) };
+    let found = trial.run(&mut |world| {
+        if world.step_index > 0 {
+            (steps, sweeps) = (steps + 1, sweeps + world.counts.sweeps);
+        }
+        Ok(())
     })?;
-    Ok((outcome, work.get() / f64::max(steps.get(), 1.0)))
+    let steps = steps as f64;
+    let work = (sweeps as f64 + steps * substeps) / steps.max(1.0);
+    Ok((RunOutcome::new(found, 0), work))
 }
 
-/// The same, as long as `goes_on` returns true after a step.
-fn observe_while(
-    loaded: Loaded,
-    settings: Settings,
-    hash_at: u32,
-    goes_on: &dyn Fn(&World, &HoldWatch) -> bool,
-) -> Result<RunOutcome, Error> {
-    let Loaded { scene, mut truth, demands, .. } = loaded;
-    let mut world = scene.build(Settings { record_impulses: true, observe_rule: true, ..settings })?;
-    let mut observation = Observation::new(&world);
-    let mut watch = HoldWatch::new(&world, demands);
-    let mut hash = 0;
-    let failed = |divergence, hash| RunOutcome { errors: Err(divergence), truth: None, broken: None, hash };
-    for step in 1..=scene.steps {
-        if let Err(divergence) = world.step() {
-            return Ok(failed(divergence, hash));
-        }
-        observation.observe(&world);
-        watch.observe(&world);
-        if let Some(blow_up) = observation.blown_up() {
-            return Ok(failed(blow_up, hash));
-        }
-        if let Some(truth) = &mut truth {
-            truth.observer.observe(&world);
-        }
-        if step == hash_at {
-            hash = world.state_hash();
-        }
-        if !goes_on(&world, &watch) {
-            break;
-        }
+impl RunOutcome {
+    fn new(found: TrialOutcome, hash: u64) -> Self {
+        let TrialOutcome { errors, failure, truth, broken, .. } = found;
+        let errors = failure.map_or(Ok(errors.unwrap_or_default()), Err);
+        RunOutcome { broken: broken.filter(|_| errors.is_ok()), errors, truth, hash }
     }
-    Ok(RunOutcome {
-        errors: Ok(observation.errors()),
-        truth: truth.as_ref().map(TruthError::of),
-        broken: watch.broken(),
-        hash,
-    })
 }
 
 /// Source of a record.

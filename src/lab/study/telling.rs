@@ -4,12 +4,11 @@ use super::answer::Answer;
 use super::curve::solvers_of;
 use super::{ErrorCell, Record, StudyPlan, settings};
 use crate::engine::lanes::LaneWidth;
-use crate::engine::world::{Order, Settings, World};
+use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::overrides;
 use crate::lab::recording::record::{Caption, Recorder};
-use crate::lab::scenes::Loaded;
-use crate::lab::scenes::holds::HoldWatch;
+use crate::lab::trial::Trial;
 use crate::lab::units::lanes;
 use std::cmp::Reverse;
 
@@ -79,7 +78,7 @@ fn recording(plan: &StudyPlan, record: &Record) -> Result<Vec<u8>, Error> {
         }
     }
     let solver = plan.solvers.iter().find(|v| v.name == record.solver).copied();
-    let (Some(Loaded { scene, demands, .. }), Some(solver)) = (loaded, solver) else {
+    let (Some(mut loaded), Some(solver)) = (loaded, solver) else {
         return Err(Error::invalid("replay", format!("no run of {} on {}", record.solver, record.scene)));
     };
     let Record { impacts, budget, .. } = *record;
@@ -96,19 +95,21 @@ fn recording(plan: &StudyPlan, record: &Record) -> Result<Vec<u8>, Error> {
     };
     let width = LaneWidth::from_lanes(record.lanes).unwrap_or(LaneWidth::W1);
     let own = settings(plan, &cell, record.order, width);
-    let mut world: World = scene.build(Settings { record_impulses: true, ..own })?;
     let setting = format!("{}, {}", record.budget_text, lanes(record.lanes));
     let caption = Caption { scene: record.scene.clone(), solver: record.solver.into(), setting };
-    let mut recorder = Recorder::new(&world, caption, scene.steps.div_ceil(FRAMES), true);
-    let mut watch = HoldWatch::new(&world, demands);
-    for _ in 0..scene.steps {
-        if let Err(divergence) = world.step() {
-            return recorder.finish(&format!("blew up at step {}", divergence.step));
+    let mut recorder: Option<Recorder> = None;
+    let trial = Trial { measured: 0, ..Trial::of(&mut loaded, Settings { record_impulses: true, ..own }) };
+    let every = trial.scene.steps.div_ceil(FRAMES);
+    let found = trial.run(&mut |world| match &mut recorder {
+        Some(recorder) => recorder.add(world),
+        None => {
+            recorder = Some(Recorder::new(world, caption.clone(), every, true));
+            Ok(())
         }
-        watch.observe(&world);
-        recorder.add(&world)?;
-    }
-    recorder.finish(&watch.broken().map_or("holds".to_string(), |broken| broken.to_string()))
+    })?;
+    let blew_up = found.failure.map(|d| format!("blew up at step {}", d.step));
+    let outcome = blew_up.or(found.broken.map(|b| b.to_string())).unwrap_or("holds".into());
+    recorder.map_or(Ok(Vec::new()), |recorder| recorder.finish(&outcome))
 }
 
 #[cfg(test)]
