@@ -1,12 +1,11 @@
 //! `simpulse ablate`: the effect of leaving out each mechanism of a solver.
 
-use super::output::{note, print, print_json, value};
+use super::output::{print, print_json, value};
 use super::progress::Bar;
 use super::values;
 use crate::engine::solvers::{DEFAULT, VARIANTS, Variant};
 use crate::lab::ablate::{self, AblationPlan};
 use crate::lab::error::Error;
-use crate::lab::estimate::Estimate;
 use crate::lab::verify;
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
@@ -52,9 +51,6 @@ pub struct AblateArgs {
     pub json: bool,
 }
 
-/// Mean time of a case and of a scene on one Zen 5 core (s).
-const SECONDS: [f64; 2] = [0.25, 0.5];
-
 /// Runs the command.
 pub fn run(args: &AblateArgs) -> Result<ExitCode, Error> {
     let solver = args.solver;
@@ -75,10 +71,6 @@ pub fn run(args: &AblateArgs) -> Result<ExitCode, Error> {
         steps: args.steps,
         threads: args.threads.into(),
     };
-    let runs = plan.mechanisms.len() as f64;
-    let cases = (runs + 1.0) * SECONDS[0] * plan.cases.len() as f64 / f64::from(args.threads);
-    let scenes = runs * SECONDS[1] * plan.scenes.len() as f64 * f64::from(args.steps) / 300.0;
-    note(&Estimate { seconds: cases + scenes, bytes: 0.0 }.time_note("ablate"));
     let bar = Bar::new();
     let rows = ablate::run(&plan, &|done, total, what: &str| bar.show(done, total, what))?;
     drop(bar);

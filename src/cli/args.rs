@@ -7,13 +7,10 @@ use super::capture::CaptureArgs;
 use super::compare::CompareArgs;
 use super::converge::ConvergeArgs;
 use super::growth::GrowthArgs;
-use super::merge::MergeArgs;
 use super::papers::PapersArgs;
 use super::profile::ProfileArgs;
 use super::replay::ReplayArgs;
-use super::report::ReportArgs;
 use super::run::RunArgs;
-use super::savings::SavingsArgs;
 use super::snapshot::SnapshotArgs;
 use super::study::{EXAMPLES as STUDY_EXAMPLES, StudyArgs};
 use super::torture::TortureArgs;
@@ -61,11 +58,9 @@ pub enum Command {
     #[command(after_help = STUDY_EXAMPLES)]
     Study(StudyArgs),
     Compare(CompareArgs),
-    Merge(MergeArgs),
     Run(RunArgs),
     Snapshot(SnapshotArgs),
     Replay(ReplayArgs),
-    Report(ReportArgs),
     Advise(AdviseArgs),
     Capture(CaptureArgs),
     Converge(ConvergeArgs),
@@ -75,7 +70,6 @@ pub enum Command {
     Torture(TortureArgs),
     Profile(ProfileArgs),
     Growth(GrowthArgs),
-    Savings(SavingsArgs),
     Papers(PapersArgs),
     /// List the scenes
     Scenes(ListArgs),

@@ -1,13 +1,13 @@
 //! `simpulse growth`: the cost per contact, from a thousand contacts to a million.
 
-use super::output::{note, print, print_json};
+use super::output::{print, print_json};
 use super::progress::Bar;
 use super::settled;
 use super::values::{self, LaneArgs, SettingArgs};
 use crate::engine::world::{Settings, World};
 use crate::lab::error::Error;
-use crate::lab::estimate::{self, Estimate, free_memory};
 use crate::lab::files;
+use crate::lab::memory;
 use crate::lab::profile::growth::{GrowthWorld, Measurement, measure, size_for, verdicts};
 use crate::lab::profile::growth_report;
 use crate::lab::profile::islands::islands;
@@ -15,7 +15,6 @@ use crate::lab::profile::records::growth_json;
 use crate::lab::profile::waiting;
 use crate::lab::report::units::lanes;
 use crate::lab::scenes::{CATALOG, MAX_BODIES, Scene, Size};
-use crate::lab::study::cost::sweeps;
 use crate::lab::study::{is_path, open_scene};
 use clap::Args;
 use std::path::PathBuf;
@@ -154,24 +153,6 @@ fn targets(texts: &[String]) -> Result<Vec<f64>, Error> {
     Ok(targets)
 }
 
-/// Contacts per body in a pile of boxes, and memory of a world per contact (B).
-const CONTACTS_PER_BODY: f64 = 3.0;
-const BYTES_PER_CONTACT: f64 = 1250.0;
-
-/// Steps of one timing run of a size, including those that restore the state.
-const STEPS_PER_REPEAT: u32 = 4;
-
-/// Estimate of the whole command. Sizes with too many bodies are left out.
-fn estimate(targets: &[f64], args: &GrowthArgs, settings: &Settings) -> Estimate {
-    let possible = |target: &&f64| **target <= CONTACTS_PER_BODY * MAX_BODIES as f64;
-    let contacts: f64 = targets.iter().filter(possible).sum();
-    let sweeps = sweeps(&settings.budget, settings.solver);
-    let bodies = (contacts / CONTACTS_PER_BODY) as usize;
-    let steps = args.settle.saturating_add(args.repeats.saturating_mul(STEPS_PER_REPEAT));
-    let seconds = f64::from(steps) * estimate::step(bodies, sweeps, settings.width.lanes());
-    Estimate { seconds, bytes: contacts * BYTES_PER_CONTACT }
-}
-
 /// Runs the command.
 pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
     let (solver, width) = (args.setting.solver, args.lanes.or_native());
@@ -182,8 +163,6 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
         named(&args.scene)?;
     }
     let family = GrowthFamily::new(&args.scene, &settings, args.settle)?;
-    let estimate = estimate(&targets, args, &settings);
-    note(&estimate.note("growth", None)?);
     files::prepare_folder(&args.out)?;
     let mut entries: Vec<GrowthWorld> = Vec::new();
     let mut notes = String::new();
@@ -200,7 +179,7 @@ pub fn run(args: &GrowthArgs) -> Result<ExitCode, Error> {
         let bytes =
             |e: &GrowthWorld| 2.0 * e.world.memory().held() as f64 / e.world.counts.contacts.max(1) as f64;
         let expected = entries.last().map_or(0.0, bytes) * target;
-        if free_memory().is_some_and(|free| expected > MEMORY_SHARE * free) {
+        if memory::free().is_some_and(|free| expected > MEMORY_SHARE * free) {
             notes +=
                 &format!("skipped: {target} contacts would take about {:.0} MB of memory\n", 1e-6 * expected);
             continue;

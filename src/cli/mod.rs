@@ -12,15 +12,12 @@ pub mod compare;
 pub mod converge;
 pub mod growth;
 pub mod interrupt;
-pub mod merge;
 pub mod output;
 pub mod papers;
 pub mod profile;
 pub mod progress;
 pub mod replay;
-pub mod report;
 pub mod run;
-pub mod savings;
 pub mod snapshot;
 pub mod study;
 pub mod times;
@@ -99,11 +96,9 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         None => full_study(&cli.study),
         Some(Command::Study(args)) => full_study(&args),
         Some(Command::Compare(args)) => compare::run(&args),
-        Some(Command::Merge(args)) => merge::run(&args),
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Snapshot(args)) => snapshot::run(&args),
         Some(Command::Replay(args)) => replay::run(&args),
-        Some(Command::Report(args)) => report::run(&args),
         Some(Command::Advise(args)) => advise::run(&args),
         Some(Command::Capture(args)) => capture::run(&args),
         Some(Command::Converge(args)) => converge::run(&args),
@@ -113,7 +108,6 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Torture(args)) => torture::run(&args),
         Some(Command::Profile(args)) => profile::run(&args),
         Some(Command::Growth(args)) => growth::run(&args),
-        Some(Command::Savings(args)) => savings::run(&args),
         Some(Command::Papers(args)) => papers::run(&args),
         Some(Command::Scenes(args)) => scenes(&args),
         Some(Command::Solvers(args)) => solvers(&args),

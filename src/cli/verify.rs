@@ -6,7 +6,6 @@ use super::values::{self, ImpactArgs, Solvers, WithoutArgs};
 use crate::engine::constraints::Impacts;
 use crate::engine::solvers::{DEFAULT, Variant};
 use crate::lab::error::Error;
-use crate::lab::estimate::Estimate;
 use crate::lab::verify::{
     self, CASES, Case, Cell, Finding, Lab, LawOf, ParameterSweep, Required, SweepRow, VerifyMatrix,
 };
@@ -67,8 +66,6 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
     }
     let solvers = args.solvers.chosen();
     let note = values::left_out(&solvers);
-    let seconds = SECONDS_PER_CASE * (cases.len() * solvers.len()) as f64 / f64::from(args.threads);
-    output::note(&Estimate { seconds, bytes: 0.0 }.time_note("verify"));
     let bar = Bar::new();
     let impacts = args.impacts.impacts;
     let tell = |p: verify::CaseProgress| bar.show(p.done, p.total, p.what);
@@ -86,9 +83,6 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
     print(&(text(&matrix) + &note + &verdict(&matrix)), exit_code(&matrix))
 }
 
-/// Mean time of a case on one Zen 5 core (s).
-const SECONDS_PER_CASE: f64 = 0.25;
-
 /// 1 if the default solver ran and failed a required case, otherwise 0.
 fn exit_code(matrix: &VerifyMatrix) -> ExitCode {
     match matrix.broken_promises(DEFAULT) {
@@ -98,6 +92,28 @@ fn exit_code(matrix: &VerifyMatrix) -> ExitCode {
 }
 
 fn verdict(matrix: &VerifyMatrix) -> String {
+    required(matrix) + &failed_others(matrix)
+}
+
+/// The failed cases that are not required of the default solver, by name.
+fn failed_others(matrix: &VerifyMatrix) -> String {
+    let Some(place) = matrix.solvers.iter().position(|solver| solver.name == DEFAULT) else {
+        return String::new();
+    };
+    let rows = matrix.cases.iter().zip(&matrix.cells);
+    let failed =
+        rows.filter(|(case, cells)| !case.required.is_required() && cells[place].passed() == Some(false));
+    let ids: Vec<&str> = failed.map(|(case, _)| case.id).collect();
+    match ids.len() {
+        0 => String::new(),
+        count => format!(
+            "it failed {count} cases that are not required of it (--list says why): {}\n",
+            ids.join(", ")
+        ),
+    }
+}
+
+fn required(matrix: &VerifyMatrix) -> String {
     let required = matrix.cases.iter().filter(|case| case.required.is_required()).count();
     match matrix.broken_promises(DEFAULT) {
         None => format!("{DEFAULT}, the default solver, did not run: nothing was required\n"),

@@ -80,14 +80,14 @@ const ENGINE: &[&[&str]] = &[
 ];
 const LAB: &[&[&str]] = &[
     &["error"],
-    &["estimate", "files", "interned", "overrides", "units"],
+    &["files", "interned", "memory", "overrides", "units"],
     &["reference"],
     &["metrics"],
     &["scenes", "capture", "picture"],
     &["trial"],
     &["recording"],
     &["verify", "study", "converge"],
-    &["advise", "report"],
+    &["report"],
     &["ablate", "agree", "profile", "compare", "torture"],
 ];
 

@@ -6,9 +6,11 @@ use super::sample::Sample;
 use super::sweep::Swept;
 use crate::engine::constraints::Impacts;
 use crate::engine::params::Budget;
+use crate::engine::solvers::find;
 use crate::engine::world::{Criterion, Divergence, Order, Quantity};
 use crate::lab::interned::{self, Name};
 use crate::lab::metrics::Errors;
+use crate::lab::overrides;
 use crate::lab::scenes::holds::{Broken, Mark};
 use crate::lab::scenes::tolerance::{Accuracy, Tolerances};
 pub use crate::lab::trial::TruthError;
@@ -148,7 +150,50 @@ impl Record {
         self.broken.map(|b| b.mark).or(self.failure.map(|_| Mark::BlewUp))
     }
 
-    /// Whether the run holds. Fronts, slices, profiles and advice include only such settings.
+    /// Step of the first violated requirement or of the divergence; `None` if the run holds.
+    pub fn failed_step(&self) -> Option<u64> {
+        self.broken.map(|b| b.step).or(self.failure.map(|f| f.step))
+    }
+
+    /// The command that runs this setting on `scene`, a name or a file.
+    pub fn command(&self, scene: &str) -> String {
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-.:/".contains(c);
+        let scene = match scene.chars().all(is_plain) && !scene.is_empty() {
+            true => scene.to_string(),
+            false => format!("'{}'", scene.replace('\'', "'\\''")),
+        };
+        let mut text = format!("simpulse run {scene} --solver {}", self.solver);
+        text += &match self.order {
+            Order::Colored => format!(" --lanes {}", self.lanes),
+            order => format!(" --order {}", order.name()),
+        };
+        text += &format!(" --substeps {}", self.budget.substeps);
+        if let Ok(solver) = find(self.solver) {
+            let fields = [
+                ("velocity", self.budget.velocity_iterations, solver.uses.velocity),
+                ("relax", self.budget.relax_iterations, solver.uses.relax),
+                ("position", self.budget.position_iterations, solver.uses.position),
+            ];
+            let used = fields.into_iter().filter(|f| f.2);
+            text += &used.map(|(name, n, _)| format!(" --{name}-iterations {n}")).collect::<String>();
+            let own = overrides::of_words(solver, &self.parameters).unwrap_or_else(|_| solver.defaults());
+            for word in overrides::changed(solver, &own).split_whitespace() {
+                text += &format!(" --set {word}");
+            }
+        }
+        if self.impacts != Impacts::Own {
+            text += &format!(" --impacts {}", self.impacts.name());
+        }
+        text
+    }
+
+    /// The command that draws this setting where it failed.
+    pub fn command_to_see(&self, scene: &str) -> String {
+        let steps = self.failed_step().map_or(String::new(), |step| format!(" --steps {step}"));
+        format!("{}{steps} --picture failed.svg", self.command(scene))
+    }
+
+    /// Whether the run holds. Fronts, profiles and advice include only such settings.
     pub fn holds(&self) -> bool {
         self.mark().is_none()
     }

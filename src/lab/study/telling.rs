@@ -2,6 +2,7 @@
 
 use super::answer::Answer;
 use super::curve::solvers_of;
+use super::found::TunedBudget;
 use super::{ErrorCell, Record, StudyPlan, settings};
 use crate::engine::lanes::LaneWidth;
 use crate::engine::world::{Order, Settings};
@@ -70,11 +71,11 @@ pub fn recordings(plan: &StudyPlan, records: &[Record]) -> Result<Vec<Vec<u8>>, 
 }
 
 fn recording(plan: &StudyPlan, record: &Record) -> Result<Vec<u8>, Error> {
-    let (mut name, mut loaded) = ("", None);
+    let mut loaded = None;
     for given in &plan.scenes {
         let opened = plan.open(given)?;
         if opened.scene.name == record.scene {
-            (name, loaded) = (given.as_str(), Some(opened));
+            loaded = Some(opened);
         }
     }
     let solver = plan.solvers.iter().find(|v| v.name == record.solver).copied();
@@ -82,17 +83,8 @@ fn recording(plan: &StudyPlan, record: &Record) -> Result<Vec<u8>, Error> {
         return Err(Error::invalid("replay", format!("no run of {} on {}", record.solver, record.scene)));
     };
     let Record { impacts, budget, .. } = *record;
-    let parameters = overrides::of_words(solver, &record.parameters)?;
-    let cell = ErrorCell {
-        scene: [0; 2],
-        swept: None,
-        name,
-        solver,
-        impacts,
-        budget,
-        parameters,
-        widest_alone: false,
-    };
+    let tuned = TunedBudget { budget, parameters: overrides::of_words(solver, &record.parameters)? };
+    let cell = ErrorCell { point: 0, swept: None, solver, impacts, tuned, widest_alone: false };
     let width = LaneWidth::from_lanes(record.lanes).unwrap_or(LaneWidth::W1);
     let own = settings(plan, &cell, record.order, width);
     let setting = format!("{}, {}", record.budget_text, lanes(record.lanes));
