@@ -279,7 +279,7 @@ fn the_answer_comes_first_and_fills_a_page_at_most() {
     assert!(errors(&output).is_empty(), "progress is for terminals: {}", text(&output.stderr));
     let (answer, tables) = text(&output.stdout).split_once("\nbudget: substeps").unwrap();
     assert!(answer.lines().count() <= 60 && answer.contains("Ranking over all scenes"), "{answer}");
-    assert!(tables.contains("Equal time") && tables.contains("Performance profiles"));
+    assert!(tables.contains("Performance profiles"));
     let widest = answer.lines().map(|line| line.chars().count()).max();
     assert!(widest <= Some(120), "{answer}");
 }
@@ -376,10 +376,19 @@ fn data_is_printed_as_json_where_that_is_asked_for() {
     assert!(frozen["certificate"].is_object(), "{frozen}");
     let profile = ["profile", "stack:5", "--seconds", "0.2", "--settle", "3", "--json"];
     assert!(json(&profile)["phases"][0]["limit"].is_string());
-    let savings = ["savings", "--scenes", "circle_pile:150", "--repeats", "1", "--json"];
-    assert!(json(&savings)["savings"].is_array());
+    let features =
+        ["study", "--scenes", "stack:2", "--solvers", "pgs", "--features", "all", "--repeats", "1"];
+    let features = json(&[&features[..], &["--out", "features", "--json"]].concat());
+    let records = features["records"].as_array().unwrap();
+    let at = |i: usize, key: &str| records[i]["sample"]["load"][key].as_f64().unwrap();
+    // A stack needs no restitution, and records with it are larger.
+    assert!(records.len() == 2 && at(0, "bytes_per_contact") < at(1, "bytes_per_contact"));
+    assert_eq!((at(0, "contacts"), &records[0]["errors"]), (at(1, "contacts"), &records[1]["errors"]));
+    let sizes = ["study", "--scenes", "stack", "--solvers", "pgs", "--sweep", "size=2,4", "--repeats", "1"];
+    let sizes = json(&[&sizes[..], &["--steps", "20", "--out", "sizes", "--json"]].concat());
+    assert_eq!(sizes["records"][1]["bodies"].as_u64(), Some(5));
     let advise = ["advise", "stack:3", "--max-penetration", "20mm", "--steps", "40", "--repeats", "1"];
-    let advise = [&advise[..], &["--solvers", "pgs,soft_step", "--seconds", "5", "--json"]].concat();
+    let advise = [&advise[..], &["--solvers", "pgs,soft_step", "--json"]].concat();
     assert!(json(&advise)["trials"].is_array());
     let study = ["--quick", "--scenes", "stack:2", "--solvers", "pgs", "--lanes", "1", "--json"];
     assert_eq!(json(&study)["records"].as_array().unwrap().len(), 3 * 2);
@@ -390,7 +399,7 @@ fn advice_ends_with_the_command_that_repeats_it() {
     let folder = tempfile::tempdir().unwrap();
     let args =
         ["advise", "stack:3", "--max-penetration", "20mm", "--steps", "40", "--repeats", "1", "--solvers"];
-    let output = simpulse(folder.path(), &[&args[..], &["soft_step", "--seconds", "5"]].concat());
+    let output = simpulse(folder.path(), &[&args[..], &["soft_step"]].concat());
     let last = text(&output.stdout).lines().last().unwrap();
     let command = last.strip_prefix("to run it: simpulse ").unwrap_or_else(|| panic!("{last}"));
     let words: Vec<&str> = command.split(' ').collect();
@@ -588,8 +597,8 @@ fn a_part_that_is_missing_and_a_folder_in_use_are_refused() {
         let options = "--quick --scenes stack:2,stack:3,stack:4 --solvers pgs --lanes 1";
         succeeds(folder.path(), &format!("{options} --shard {i}/3 --out part-{i}"));
     }
-    refused(folder.path(), &["merge", "part-1", "part-3"], &["stack:3", "--partial"]);
-    succeeds(folder.path(), "merge part-1 part-2 part-3 --out whole");
+    refused(folder.path(), &["study", "--merge", "part-1", "part-3"], &["stack:3", "--partial"]);
+    succeeds(folder.path(), "study --merge part-1,part-2,part-3 --out whole");
 
     let lock = simpulse::lab::files::Lock::of(&folder.path().join("whole")).unwrap();
     let args = ["--quick", "--scenes", "stack:2", "--solvers", "pgs", "--lanes", "1", "--out", "whole"];
@@ -598,5 +607,93 @@ fn a_part_that_is_missing_and_a_folder_in_use_are_refused() {
 
     // A folder of an older program version is rejected, and the version is named.
     std::fs::write(folder.path().join("whole/study.json"), r#"{"environment":{"version":"0.0.1"}}"#).unwrap();
-    refused(folder.path(), &["report", "whole"], &["schema version 1", "0.0.1"]);
+    refused(folder.path(), &["study", "--from", "whole"], &["schema version 1", "0.0.1"]);
+    refused(folder.path(), &["report", "whole"], &["simpulse study --from DIR"]);
+}
+
+/// Names and contents of a study's files that do not depend on times.
+fn errors_of(folder: &Path) -> Vec<String> {
+    let study = StudyFile::read(folder).unwrap();
+    study.records.iter().map(|r| format!("{} {} {:?}", r.scene, r.budget_text, r.errors)).collect()
+}
+
+#[test]
+fn no_study_is_overwritten() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let args = ["--quick", "--solvers", "pgs", "--lanes", "1", "--out", "o", "--scenes"];
+    let mut kept = Vec::new();
+    for (i, scene) in ["stack:2", "stack:2", "stack:3"].into_iter().enumerate() {
+        let output = simpulse(path, &[&args[..], &[scene]].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        let said = format!("the study that was there is now in o/previous/{i}");
+        assert_eq!(text(&output.stdout).contains(&said), i > 0, "{}", text(&output.stdout));
+        kept.push(std::fs::read(path.join("o/study.json")).unwrap());
+    }
+    for (i, bytes) in kept[..2].iter().enumerate() {
+        let place = path.join(format!("o/previous/{}", i + 1));
+        assert_eq!(std::fs::read(place.join("study.json")).unwrap(), *bytes);
+        assert!(place.join("report.html").exists());
+    }
+    // A merge that is typed wrongly replaces nothing either.
+    let merged = simpulse(path, &["study", "--merge", "o", "--out", "o"]);
+    assert!(text(&merged.stdout).contains("o/previous/3"), "{}", text(&merged.stderr));
+}
+
+#[test]
+fn a_study_goes_on_where_it_stopped() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let args =
+        ["--quick", "--solvers", "pgs", "--lanes", "1", "--scenes", "stack:2,stack:3,stack:4", "--out"];
+    let run = |more: &[&str]| simpulse(path, &[&args[..], more].concat());
+    assert_eq!(run(&["whole"]).status.code(), Some(0));
+    refused(path, &[&args[..], &["none", "--resume"]].concat(), &["none"]);
+    // As if it had been stopped after the first scene.
+    std::fs::create_dir(path.join("part")).unwrap();
+    let mut part = StudyFile::read(&path.join("whole")).unwrap();
+    part.records.retain(|r| r.scene == "stack:2");
+    part.missing_scenes = vec!["stack:3".into(), "stack:4".into()];
+    std::fs::write(path.join("part/study.json"), part.to_json().unwrap()).unwrap();
+    refused(
+        path,
+        &[&args[..], &["part", "--resume", "--repeats", "2"]].concat(),
+        &["repeats is 1 there, 2 here"],
+    );
+    let output = run(&["part", "--resume"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert_eq!(errors_of(&path.join("part")), errors_of(&path.join("whole")));
+    let study = StudyFile::read(&path.join("part")).unwrap();
+    assert!(study.missing_scenes.is_empty() && study.parts.len() == 2);
+    assert_eq!(
+        study.records[0].sample.as_ref().unwrap().mean_ns,
+        part.records[0].sample.as_ref().unwrap().mean_ns
+    );
+    assert!(!path.join("part/previous").exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn what_a_stopped_study_has_finished_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let args =
+        ["study", "--scenes", "stack:2,pyramid:60", "--solvers", "shim", "--steps", "60", "--out", "o"];
+    let mut run = Command::new(env!("CARGO_BIN_EXE_simpulse"));
+    let mut child = run.current_dir(path).args(args).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    while !path.join("o/report.html").exists() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let pid = child.id().to_string();
+    assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let message = text(&output.stderr);
+    assert_eq!(
+        (output.status.code(), message.contains("1 of 2 scenes are in o")),
+        (Some(130), true),
+        "{message}"
+    );
+    let study = StudyFile::read(&path.join("o")).unwrap();
+    assert_eq!((study.scenes(), study.missing_scenes), (vec!["stack:2".into()], vec!["pyramid:60".into()]));
+    assert!(entries(&path.join("o")).iter().all(|name| !name.starts_with('.')));
 }

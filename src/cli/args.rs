@@ -3,11 +3,8 @@
 use super::advise::AdviseArgs;
 use super::compare::CompareArgs;
 use super::converge::ConvergeArgs;
-use super::merge::MergeArgs;
 use super::profile::ProfileArgs;
-use super::report::ReportArgs;
 use super::run::RunArgs;
-use super::savings::SavingsArgs;
 use super::study::{EXAMPLES as STUDY_EXAMPLES, StudyArgs};
 use super::values;
 use super::verify::VerifyArgs;
@@ -53,14 +50,11 @@ pub enum Command {
     #[command(after_help = STUDY_EXAMPLES)]
     Study(StudyArgs),
     Compare(CompareArgs),
-    Merge(MergeArgs),
     Run(RunArgs),
-    Report(ReportArgs),
     Advise(AdviseArgs),
     Converge(ConvergeArgs),
     Verify(VerifyArgs),
     Profile(ProfileArgs),
-    Savings(SavingsArgs),
     /// List the scenes
     Scenes(ListArgs),
     /// List the solvers

@@ -1,5 +1,6 @@
-//! SIGINT, SIGTERM and SIGHUP: no half-written file stays behind, and finished results are kept.
+//! SIGINT, SIGTERM and SIGHUP: no half-written file stays behind.
 
+use super::output::note;
 use crate::lab::files;
 use std::process::exit;
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
@@ -8,25 +9,22 @@ use std::time::Duration;
 /// Exit code of an interrupted command.
 const INTERRUPTED: i32 = 130;
 
-/// An interrupted command may go on writing results for at most this many moments.
+/// Files that belong together may be written for at most this many moments after a signal.
 const PATIENCE: u32 = 100;
 const MOMENT: Duration = Duration::from_millis(100);
 
-type Rescue = Box<dyn FnOnce() + Send>;
+/// What an interrupted command says.
+static MESSAGE: Mutex<String> = Mutex::new(String::new());
 
-static RESCUE: Mutex<Option<Rescue>> = Mutex::new(None);
+/// Locked while files that belong together are written.
+static WRITING: Mutex<()> = Mutex::new(());
 
-/// After this call, a signal runs the last closure given to [`on_interrupt`], removes temporary files and
-/// ends the process with code 130.
+/// After this call, a signal waits for files that are being written, removes temporary files, prints the text
+/// given to [`say`] and ends the process with code 130.
 pub fn install() {
     // If no handler can be installed (there is one already, or the system has none), signals keep their
     // default action.
     let _ = ctrlc::set_handler(|| {
-        if let Some(rescue) = take() {
-            rescue();
-        }
-        // If files that belong together are being written, wait until that is done, but only for a limited
-        // time.
         let mut writing = WRITING.try_lock();
         for _ in 0..PATIENCE {
             if !matches!(writing, Err(TryLockError::WouldBlock)) {
@@ -35,42 +33,18 @@ pub fn install() {
             std::thread::sleep(MOMENT);
             writing = WRITING.try_lock();
         }
+        note(&MESSAGE.lock().unwrap_or_else(PoisonError::into_inner));
         files::remove_temporaries();
         exit(INTERRUPTED);
     });
 }
 
-/// Runs `rescue` if the process is interrupted before the guard is dropped.
-pub fn on_interrupt(rescue: impl FnOnce() + Send + 'static) -> Guard {
-    *RESCUE.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(rescue));
-    Guard
+/// Sets the text that is printed if the process is interrupted from now on.
+pub fn say(text: String) {
+    *MESSAGE.lock().unwrap_or_else(PoisonError::into_inner) = text;
 }
 
-/// Unregisters the closure given to [`on_interrupt`] when dropped.
-pub struct Guard;
-
-/// Locked while files that belong together are written.
-static WRITING: Mutex<()> = Mutex::new(());
-
-/// Delays signals until it is dropped.
-pub struct Writing(#[allow(dead_code)] MutexGuard<'static, ()>);
-
-impl Guard {
-    /// Stops rescuing partial results: the final ones are being written, and a signal waits until that is
-    /// done.
-    pub fn finish(self) -> Writing {
-        let writing = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
-        drop(self);
-        Writing(writing)
-    }
-}
-
-impl Drop for Guard {
-    fn drop(&mut self) {
-        drop(take());
-    }
-}
-
-fn take() -> Option<Rescue> {
-    RESCUE.lock().unwrap_or_else(PoisonError::into_inner).take()
+/// Delays signals until the guard is dropped.
+pub fn writing() -> MutexGuard<'static, ()> {
+    WRITING.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -8,16 +8,13 @@ pub mod args;
 pub mod compare;
 pub mod converge;
 pub mod interrupt;
-pub mod merge;
 pub mod output;
 pub mod picture;
 pub mod profile;
 pub mod progress;
 pub mod random;
 pub mod record;
-pub mod report;
 pub mod run;
-pub mod savings;
 pub mod study;
 pub mod times;
 pub mod values;
@@ -94,14 +91,11 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         None => full_study(&cli.study),
         Some(Command::Study(args)) => full_study(&args),
         Some(Command::Compare(args)) => compare::run(&args),
-        Some(Command::Merge(args)) => merge::run(&args),
         Some(Command::Run(args)) => run::run(&args),
-        Some(Command::Report(args)) => report::run(&args),
         Some(Command::Advise(args)) => advise::run(&args),
         Some(Command::Converge(args)) => converge::run(&args),
         Some(Command::Verify(args)) => verify::run(&args),
         Some(Command::Profile(args)) => profile::run(&args),
-        Some(Command::Savings(args)) => savings::run(&args),
         Some(Command::Scenes(args)) => scenes(&args),
         Some(Command::Solvers(args)) => solvers(&args),
         Some(Command::Scene(args)) => print(&scene(&args)?),

@@ -10,8 +10,8 @@ use crate::engine::constraints::records::rows::RowLaw;
 use crate::engine::lanes::LaneWidth;
 use crate::engine::world::{Order, Settings, SolvedBlock, World};
 use crate::lab::error::Error;
-use crate::lab::estimate::{self, Estimate, free_memory};
 use crate::lab::files::{Pending, same_file};
+use crate::lab::memory;
 use crate::lab::metrics::state::Angles;
 use crate::lab::metrics::{Errors, Observation};
 use crate::lab::overrides;
@@ -21,7 +21,6 @@ use crate::lab::report::table::error_list;
 use crate::lab::report::units::{bodies, lanes, ratio, si};
 use crate::lab::scenes::Scene;
 use crate::lab::scenes::holds::{Broken, HoldWatch};
-use crate::lab::study::cost::sweeps;
 use crate::lab::study::{FailedAt, TruthError, budget, open_scene};
 use clap::Args;
 use serde_json::{Value, json};
@@ -148,7 +147,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     }
     let mut loaded = open_scene(&args.scene, args.seed, args.steps, args.dt)?;
     let scene = &loaded.scene;
-    note(&estimate(scene, &settings).note("run", free_memory())?);
+    memory::check("run", scene.bodies.len(), 0, 1)?;
     let mut world = scene.build(settings)?;
     note(&size_note(&world).unwrap_or_default());
     let mut state = args.state.as_deref().map(|path| CsvFile::new(path, &columns::STATE)).transpose()?;
@@ -221,14 +220,6 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     print_beside(files.into_iter().map(|(_, file)| file), &(text + &written))
 }
 
-/// Estimate of the command: one pass for errors, others for times.
-fn estimate(scene: &Scene, settings: &Settings) -> Estimate {
-    let bodies = scene.bodies.len();
-    let step = estimate::step(bodies, sweeps(&settings.budget, settings.solver), settings.width.lanes());
-    let seconds = f64::from(scene.steps) * (5.0 * step + estimate::errors(bodies));
-    Estimate { seconds, bytes: estimate::memory(bodies, 0, 1) }
-}
-
 /// The settings of a solver with the order and lanes of the command. Errors: natural order in lanes.
 pub(super) fn settings(args: &RunArgs, own: Settings) -> Result<Settings, Error> {
     let own = Settings { continuous: args.continuous.unwrap_or(own.continuous), ..own };
@@ -277,8 +268,13 @@ impl RunResult {
             }
         };
         let unchecked: String = self.unchecked.iter().map(|what| format!("not checked: {what}\n")).collect();
-        let demanded = self.unchecked.iter().all(|what| !what.contains("file"));
-        let yes = if demanded { "yes" } else { "not checked" };
+        let no_condition = self.unchecked.iter().any(|what| what.contains("condition"));
+        let no_value = self.truth.is_none() && !self.unchecked.is_empty();
+        let yes = match (no_condition, no_value) {
+            (true, _) => "not checked",
+            (false, true) => "yes (no reference value to compare with)",
+            (false, false) => "yes",
+        };
         let holds = self.broken.map_or(yes.to_string(), |broken| broken.mark.word().to_string());
         let when = self.broken.map_or(String::new(), |broken| format!("at step {}", broken.step));
         let joints = e.joint_gap_rms.map_or(String::new(), |rms| {

@@ -1,6 +1,6 @@
 //! `simpulse study`: compares solvers, whole or in parts.
 
-use super::interrupt::on_interrupt;
+use super::interrupt;
 use super::output::{note, print};
 use super::progress::Bar;
 use super::values::{self, Solvers};
@@ -9,22 +9,24 @@ use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::solvers::Variant;
 use crate::engine::world::Order;
 use crate::lab::error::Error;
-use crate::lab::estimate::free_memory;
 use crate::lab::files;
 use crate::lab::overrides::{self, Override};
 use crate::lab::report::study_file::StudyFile;
 use crate::lab::report::{self, answer, html, orders, sweep};
 use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::study::budget::BudgetGrid;
+use crate::lab::study::found::{self, Found, FoundBudgets};
 use crate::lab::study::sweep::QuantitySweep;
-use crate::lab::study::{self, Record, StudyPlan, telling};
+use crate::lab::study::{self, Progress, Record, StudyPlan, telling};
 use crate::lab::units::quantity;
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
+use serde_json::Value;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 /// Examples printed below the help.
 pub const EXAMPLES: &str = "\
@@ -32,6 +34,8 @@ Without budget options, a solver runs on each scene of the default study at up t
 They come from a search by errors, with the same rule and effort for all solvers (--thorough
 repeats it). On other scenes it runs at half, once and twice its standard budget. With budget
 options, every combination runs; values that a solver ignores are dropped.
+A folder keeps every study: what it holds is moved to FOLDER/previous/N when the first scene of another study
+is finished. Each scene is written as soon as it is finished; --resume runs those that are missing.
 A sweep runs at each solver's standard budget, in colored order at the widest native lanes, unless
 other options say otherwise.
 
@@ -41,6 +45,11 @@ Examples:
   simpulse study --scenes pyramid:40 --solvers soft_step --lanes 1,4,8,16 --substeps 4,8
   simpulse study --scenes stack:10,arch --sweep contact-hertz=15,30,60 --out results/hertz
   simpulse study --scenes mass_ratio --sweep mass-ratio=1,10,100,1000 --out results/ratio
+  simpulse study --scenes pyramid --solvers soft_step --sweep size=10,20,40,80 --out results/size
+  simpulse study --scenes pyramid:40,circle_pile:500 --solvers soft_step --features all --out results/features
+  simpulse study --shard 1/2 --out part-1            on one machine, 2/2 on another, and then
+  simpulse study --merge part-1,part-2 --out results
+  simpulse study --from results                      the page again, with verify.json of the folder
   simpulse study --scenes stack:20,my.json --velocity-iterations 4,16,64 --out results/stack
   simpulse study --scenes my.json --solvers all --thorough --out results/my
   simpulse study --scenes pyramid:20 --standard --orders natural,reversed,shuffled,colored --out results/orders";
@@ -82,10 +91,14 @@ pub struct StudyArgs {
     pub set: Vec<Override>,
     /// A curve per solver: one quantity takes several values, all else stays fixed. It is a solver parameter
     /// (contact-hertz), substeps, iterations (velocity sweeps; position sweeps if a solver has no others),
-    /// velocity-iterations, relax-iterations, position-iterations, dt (s), friction (of every shape), or mass-ratio
-    /// (scene mass_ratio)
+    /// velocity-iterations, relax-iterations, position-iterations, dt (s), friction (of every shape), mass-ratio
+    /// (scene mass_ratio), or size (of scenes that have one; the table has the time per contact)
     #[arg(long, value_name = "NAME=VALUE,VALUE,…")]
     pub sweep: Option<QuantitySweep>,
+    /// Compare kernels for the features of the scenes (0) with kernels for all features (1), which take the time of
+    /// friction, second points, rotation and restitution where a scene has none
+    #[arg(long, value_name = "all", value_parser = ["all"], conflicts_with = "sweep")]
+    pub features: Option<String>,
     /// Override the scenes' tolerances, such as penetration=5mm,residual=0.05,reference=0.1 (`simpulse scene NAME`
     /// lists them; that of the reference value has the value's unit)
     #[arg(long, value_delimiter = ',', value_name = "NAME=VALUE,…", value_parser = NonEmptyStringValueParser::new())]
@@ -102,9 +115,9 @@ pub struct StudyArgs {
     /// Short runs without repeats: an overview in seconds
     #[arg(long)]
     pub quick: bool,
-    /// First search the settings of each solver on each scene, by errors alone: minutes for the default study, an hour
-    /// for all solvers. Writes them to budgets.csv in the folder
-    #[arg(long, conflicts_with_all = ["sweep", "substeps", "velocity_iterations", "relax_iterations", "position_iterations"])]
+    /// First search the settings of each solver on each scene, by errors alone. Writes them to budgets.csv in the
+    /// folder
+    #[arg(long, conflicts_with_all = ["sweep", "features", "substeps", "velocity_iterations", "relax_iterations", "position_iterations"])]
     pub thorough: bool,
     /// Each solver at half, once and twice its standard budget, whatever was found
     #[arg(long, conflicts_with = "thorough")]
@@ -115,9 +128,22 @@ pub struct StudyArgs {
     /// Print JSON instead of text: what study.json holds
     #[arg(long)]
     pub json: bool,
-    /// Run part I of N: every N-th scene; `simpulse merge` joins the parts
+    /// Run part I of N: every N-th scene; --merge joins the parts
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
+    /// Go on with the study in the folder: run the scenes that it lacks. It must be the same study
+    #[arg(long)]
+    pub resume: bool,
+    /// Run nothing: merge these parts, folders or study.json files. All times of a scene come from one machine
+    #[arg(long, value_delimiter = ',', num_args = 1.., value_name = "DIR", conflicts_with_all = ["shard", "resume", "from"])]
+    pub merge: Vec<PathBuf>,
+    /// Merge even if scenes are missing
+    #[arg(long, requires = "merge")]
+    pub partial: bool,
+    /// Run nothing: write the page of the study in this folder again, with the folder's verify.json (`simpulse verify
+    /// --json > DIR/verify.json`) and recordings if it has them
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["shard", "resume"])]
+    pub from: Option<PathBuf>,
     /// Folder for the results
     #[arg(long, default_value = "results", value_name = "FOLDER")]
     pub out: PathBuf,
@@ -127,7 +153,8 @@ impl StudyArgs {
     /// The plan for these arguments. Errors: unknown names, invalid widths.
     pub fn plan(&self) -> Result<StudyPlan, Error> {
         let mut base = if self.quick { StudyPlan::quick() } else { StudyPlan::default() };
-        if self.sweep.is_some() {
+        let sweep = self.sweep.clone().or(self.features.is_some().then(QuantitySweep::of_features));
+        if sweep.is_some() {
             // A sweep draws one curve per solver, so it needs one width and one order.
             (base.widths, base.orders) = (vec![native_width()], vec![Order::Colored]);
         }
@@ -137,7 +164,7 @@ impl StudyArgs {
             solvers: self.solvers.chosen(),
             widths: values::widths(&self.lanes, base.widths),
             orders: if self.orders.is_empty() { base.orders } else { unique(&self.orders) },
-            impacts: match (self.impacts.is_empty(), self.sweep.is_some()) {
+            impacts: match (self.impacts.is_empty(), sweep.is_some()) {
                 (false, _) => unique(&self.impacts),
                 (true, true) => vec![Impacts::Own],
                 (true, false) => base.impacts,
@@ -149,13 +176,15 @@ impl StudyArgs {
                 position_iterations: self.position_iterations.clone(),
             },
             overrides: self.set.clone(),
-            sweep: self.sweep.clone(),
+            sweep,
             found: if self.standard { Arc::default() } else { base.found },
+            thorough: self.thorough,
             tolerances: tolerances(&self.tolerance)?,
             steps: self.steps.or(base.steps),
             timing_steps: base.timing_steps,
             repeats: self.repeats.unwrap_or(base.repeats),
             seed: self.seed,
+            ..base
         })
     }
 }
@@ -228,6 +257,13 @@ impl Shard {
 
 /// Runs the command.
 pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
+    if let Some(folder) = &args.from {
+        let page = html::write(folder, &StudyFile::read(folder)?)?;
+        return print(&format!("wrote {}\n", page.display()));
+    }
+    if !args.merge.is_empty() {
+        return merge(args);
+    }
     let mut plan = args.plan()?;
     let without = match plan.sweep.clone() {
         Some(sweep) => keep_concerned(&sweep, &mut plan.solvers),
@@ -238,45 +274,160 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
         (plan.scenes, elsewhere) = shard.split(plan.scenes)?;
     }
     plan.check()?;
-    let cost = study::cost::estimate(&plan)?.note("study", free_memory())?;
     let not_held: String = plan.not_held()?.iter().map(|line| format!("skipped: {line}\n")).collect();
+    note(&(without + &overrides::partly(&plan.solvers, &plan.overrides) + &not_held));
+    let found_out: String =
+        plan.find_out()?.iter().map(|line| answer::wrapped(&format!("{line}\n"))).collect();
+    let earlier = if args.resume { Some(earlier(&args.out, &plan)?) } else { None };
     // Fail before the long computation, not after it.
     files::prepare_folder(&args.out)?;
     let lock = files::Lock::of(&args.out)?;
-    note(&(without + &overrides::partly(&plan.solvers, &plan.overrides) + &not_held + &cost));
-    if args.thorough {
-        let bar = Bar::new();
-        plan.found = Arc::new(study::search::search(&plan, &|p| bar.show(p.done, p.total, p.what))?);
-        files::write(&args.out.join(study::found::NAME), &plan.found.to_csv()?)?;
-    }
-    let finished: Arc<Mutex<Vec<Record>>> = Arc::default();
-    let rescue = {
-        let (plan, out, finished, elsewhere) =
-            (plan.clone(), args.out.clone(), Arc::clone(&finished), elsewhere.clone());
-        move || {
-            let records = finished.lock().unwrap_or_else(PoisonError::into_inner).clone();
-            note(&keep(&plan, &out, records, elsewhere));
-        }
+    let steps = plan.steps;
+    let mut results = StudyResults {
+        out: &args.out,
+        plan,
+        elsewhere,
+        earlier,
+        records: Vec::new(),
+        found: Found::default(),
+        kept: None,
     };
-    let guard = on_interrupt(rescue);
     let bar = Bar::new();
-    let records = study::run(&plan, &|p| bar.show(p.done, p.total, p.what), &|scene| {
-        finished.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(scene);
-    })?;
+    let study = results.run(&|p| bar.show(p.done, p.total, p.what))?;
     drop(bar);
-    let study = StudyFile::new(&plan, records, elsewhere);
-    let replays = telling::recordings(&plan, &study.records)?;
-    // Files of an earlier study are now replaced. A signal waits until that is complete.
-    let guard = guard.finish();
+    let replays = telling::recordings(&results.plan, &study.records)?;
+    let writing = interrupt::writing();
     let replays = html::write_recordings(&args.out, &replays)?;
     let mut paths = report::write_study(&args.out, &study)?;
     paths.extend(replays);
-    drop(guard);
+    drop(writing);
     drop(lock);
     if args.json {
         return print(&String::from_utf8_lossy(&study.to_json()?));
     }
-    print(&text(&study, plan.steps, &args.out, &paths, args.verbose))
+    print(&(found_out + &text(&study, steps, &args.out, &paths, args.verbose) + &kept_note(&results.kept)))
+}
+
+/// The folder of a running study.
+struct StudyResults<'a> {
+    out: &'a Path,
+    plan: StudyPlan,
+    /// Scenes of other parts.
+    elsewhere: Vec<String>,
+    /// The study to go on with.
+    earlier: Option<StudyFile>,
+    records: Vec<Record>,
+    found: Found,
+    /// Where the study is that the folder held before.
+    kept: Option<PathBuf>,
+}
+
+impl StudyResults<'_> {
+    /// Runs the scenes that are missing, and writes the study after each of them.
+    fn run(&mut self, progress: &(dyn Fn(Progress) + Sync)) -> Result<StudyFile, Error> {
+        let mut plan = self.plan.clone();
+        if let Some(earlier) = &self.earlier {
+            plan.scenes.retain(|name| earlier.missing_scenes.contains(name));
+        }
+        let mut missing = plan.scenes.clone();
+        self.say(&missing);
+        if !plan.scenes.is_empty() {
+            study::run(&plan, progress, &mut |records, found| {
+                missing.remove(0);
+                self.write(records, found, &missing)
+            })?;
+        }
+        interrupt::say(String::new());
+        Ok(self.study(&missing))
+    }
+
+    /// Adds the records of a scene and writes the study.
+    fn write(&mut self, records: &[Record], found: &[FoundBudgets], missing: &[String]) -> Result<(), Error> {
+        let _writing = interrupt::writing();
+        if self.records.is_empty() && self.earlier.is_none() {
+            self.kept = report::keep_previous(self.out)?;
+        }
+        self.records.extend_from_slice(records);
+        self.found.entries.extend_from_slice(found);
+        if self.plan.thorough {
+            files::write(&self.out.join(found::NAME), &self.found.to_csv()?)?;
+        }
+        report::write_study(self.out, &self.study(missing))?;
+        self.say(missing);
+        Ok(())
+    }
+
+    /// The study so far.
+    fn study(&self, missing: &[String]) -> StudyFile {
+        let missing = missing.iter().chain(&self.elsewhere).cloned().collect();
+        let own = StudyFile::new(&self.plan, self.records.clone(), missing);
+        match &self.earlier {
+            Some(earlier) => own.after(earlier),
+            None => own,
+        }
+    }
+
+    /// Sets what an interrupt says.
+    fn say(&self, missing: &[String]) {
+        let (all, out) = (self.plan.scenes.len(), self.out.display());
+        interrupt::say(match all - missing.len() {
+            0 => format!("interrupted before the first of {all} scenes was finished; nothing written\n"),
+            done => format!("interrupted; {done} of {all} scenes are in {out}, --resume goes on\n"),
+        });
+    }
+}
+
+/// A line on the study that the folder held before.
+fn kept_note(kept: &Option<PathBuf>) -> String {
+    kept.as_ref()
+        .map_or(String::new(), |place| format!("the study that was there is now in {}\n", place.display()))
+}
+
+/// The study in a folder, to go on with. Errors: none there; a study with other settings.
+fn earlier(out: &Path, plan: &StudyPlan) -> Result<StudyFile, Error> {
+    let earlier = StudyFile::read(out)?;
+    let own = report::export::settings(plan);
+    let [there, here] =
+        [&earlier.settings, &own].map(|settings| settings.as_object().cloned().unwrap_or_default());
+    let short = |value: Option<&Value>| {
+        let text = value.map_or("–".to_string(), Value::to_string);
+        if text.chars().count() > 80 { "…".to_string() } else { text }
+    };
+    let differs = |name: &&String| *name != "budget_search" && there.get(*name) != here.get(*name);
+    let names: BTreeSet<&String> = there.keys().chain(here.keys()).filter(differs).collect();
+    let list: Vec<String> = names
+        .into_iter()
+        .map(|name| format!("{name} is {} there, {} here", short(there.get(name)), short(here.get(name))))
+        .collect();
+    match list.is_empty() {
+        true => Ok(earlier),
+        false => Err(Error::invalid(
+            "--resume",
+            format!("{} holds another study: {}", out.display(), list.join("; ")),
+        )),
+    }
+}
+
+/// Merges the parts of a study.
+fn merge(args: &StudyArgs) -> Result<ExitCode, Error> {
+    let parts = args.merge.iter().map(|path| StudyFile::read(path)).collect::<Result<Vec<_>, _>>()?;
+    let names: Vec<String> = args.merge.iter().map(|path| path.display().to_string()).collect();
+    let whole = StudyFile::merged(parts, &names)?;
+    if !whole.missing_scenes.is_empty() && !args.partial {
+        let missing = whole.missing_scenes.join(", ");
+        let message = format!("no part has {missing}; --partial merges without it");
+        return Err(Error::invalid("merge", message));
+    }
+    files::prepare_folder(&args.out)?;
+    let _lock = files::Lock::of(&args.out)?;
+    let _writing = interrupt::writing();
+    let kept = report::keep_previous(&args.out)?;
+    let paths = report::write_study(&args.out, &whole)?;
+    if args.json {
+        return print(&String::from_utf8_lossy(&whole.to_json()?));
+    }
+    let steps = whole.settings["steps"].as_u64().map(|steps| steps as u32);
+    print(&(text(&whole, steps, &args.out, &paths, args.verbose) + &kept_note(&kept)))
 }
 
 /// Drops solvers that do not have the swept quantity, and returns a message about them.
@@ -295,7 +446,7 @@ fn keep_concerned(sweep: &QuantitySweep, solvers: &mut Vec<&'static Variant>) ->
 }
 
 /// The answer or, for a sweep, its curves as text; then the list of written files.
-pub fn text(study: &StudyFile, steps: Option<u32>, out: &Path, paths: &[PathBuf], verbose: bool) -> String {
+fn text(study: &StudyFile, steps: Option<u32>, out: &Path, paths: &[PathBuf], verbose: bool) -> String {
     let answer = match sweep::is_sweep(&study.records) {
         true => sweep::text(&study.records, &study.environment),
         false => answer::text(&study.records, &study.environment, steps),
@@ -311,26 +462,6 @@ pub fn text(study: &StudyFile, steps: Option<u32>, out: &Path, paths: &[PathBuf]
         text += &format!("\n{}", report::tables(&study.records));
     }
     text
-}
-
-/// Writes the finished scenes of an interrupted study; returns a message.
-fn keep(plan: &StudyPlan, out: &Path, records: Vec<Record>, elsewhere: Vec<String>) -> String {
-    let done = records.chunk_by(|a, b| a.scene == b.scene).count();
-    let all = plan.scenes.len();
-    if done == 0 {
-        return format!("interrupted before the first of {all} scenes was finished; nothing written\n");
-    }
-    // Scenes are run in the order of the plan.
-    let missing = plan.scenes[done.min(all)..].iter().cloned().chain(elsewhere).collect();
-    // Existing recordings belong to another study.
-    if let Err(error) = html::write_recordings(out, &[]) {
-        return format!("interrupted; finished scenes could not be written: {error}\n");
-    }
-    match report::write_study(out, &StudyFile::new(plan, records, missing)) {
-        Ok(_) if done == all => format!("interrupted; all scenes are in {}\n", out.display()),
-        Ok(_) => format!("interrupted; {done} of {all} scenes are in {}, marked as partial\n", out.display()),
-        Err(error) => format!("interrupted; finished scenes could not be written: {error}\n"),
-    }
 }
 
 #[cfg(test)]

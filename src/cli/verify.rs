@@ -146,6 +146,28 @@ fn exit_code(matrix: &VerifyMatrix) -> ExitCode {
 }
 
 fn verdict(matrix: &VerifyMatrix) -> String {
+    required(matrix) + &failed_others(matrix)
+}
+
+/// The failed cases that are not required of the default solver, by name.
+fn failed_others(matrix: &VerifyMatrix) -> String {
+    let Some(place) = matrix.solvers.iter().position(|solver| solver.name == DEFAULT) else {
+        return String::new();
+    };
+    let rows = matrix.cases.iter().zip(&matrix.cells);
+    let failed =
+        rows.filter(|(case, cells)| !case.required.is_required() && cells[place].passed() == Some(false));
+    let ids: Vec<&str> = failed.map(|(case, _)| case.id).collect();
+    match ids.len() {
+        0 => String::new(),
+        count => format!(
+            "it failed {count} cases that are not required of it (--list says why): {}\n",
+            ids.join(", ")
+        ),
+    }
+}
+
+fn required(matrix: &VerifyMatrix) -> String {
     let required = matrix.cases.iter().filter(|case| case.required.is_required()).count();
     match matrix.broken_promises(DEFAULT) {
         None => format!("{DEFAULT}, the default solver, did not run: nothing was required\n"),

@@ -25,80 +25,58 @@ static MADE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// A file that appears under its name only with [`Pending::commit`].
 pub struct Pending {
-    file: BufWriter<WriteTarget>,
+    writer: BufWriter<Box<dyn Write>>,
+    /// A temporary file, and the path to which it is renamed when complete; `None` for what is written
+    /// directly.
+    temporary: Option<(Temporary, PathBuf)>,
     path: PathBuf,
-}
-
-/// Target of the written bytes.
-enum WriteTarget {
-    /// A temporary file, which is renamed to this path when complete.
-    Whole(Temporary, PathBuf),
-    /// An existing file, pipe or device, written directly.
-    Through(File),
-    /// Standard output, written directly.
-    StandardOutput,
 }
 
 impl Pending {
     /// Starts the file `path`, in an existing folder.
     pub fn new(path: &Path) -> Result<Self, Error> {
-        let target = WriteTarget::of(path).map_err(Error::io(path))?;
-        Ok(Pending { file: BufWriter::new(target), path: path.into() })
+        let (writer, temporary) = target(path).map_err(Error::io(path))?;
+        Ok(Pending { writer: BufWriter::new(writer), temporary, path: path.into() })
     }
 
     /// Completes the file and gives it its name.
     pub fn commit(self) -> Result<(), Error> {
-        let Pending { file, path } = self;
-        let mut target = file.into_inner().map_err(|e| Error::io(&path)(e.into_error()))?;
-        target.flush().map_err(Error::io(&path))?;
-        match target {
-            WriteTarget::Whole(temporary, place) => temporary.persist(&place).map_err(Error::io(&path)),
-            WriteTarget::Through(_) | WriteTarget::StandardOutput => Ok(()),
+        let Pending { mut writer, temporary, path } = self;
+        writer.flush().map_err(Error::io(&path))?;
+        drop(writer);
+        match temporary {
+            Some((temporary, place)) => temporary.persist(&place).map_err(Error::io(&path)),
+            None => Ok(()),
         }
     }
 }
 
 impl Write for Pending {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.file.write(bytes)
+        self.writer.write(bytes)
     }
     fn flush(&mut self) -> std::io::Result<()> {
-        self.file.flush()
+        self.writer.flush()
     }
 }
 
-impl WriteTarget {
-    fn of(path: &Path) -> std::io::Result<Self> {
-        if is_standard_output(path) {
-            return Ok(WriteTarget::StandardOutput);
-        }
-        let (place, own) = followed(path)?;
-        match std::fs::metadata(&place) {
-            Ok(found) if found.is_dir() => Err(ErrorKind::IsADirectory.into()),
-            // Write directly to devices and pipes, and to a regular file that is open under a system name
-            // such as `/dev/fd/3`.
-            Ok(found) if !found.is_file() || !own => {
-                Ok(WriteTarget::Through(OpenOptions::new().append(true).open(&place)?))
-            }
-            Ok(found) if found.permissions().readonly() => Err(ErrorKind::PermissionDenied.into()),
-            _ => Ok(WriteTarget::Whole(Temporary::in_folder(folder_of(&place))?, place)),
-        }
+/// Where the bytes of a file go.
+fn target(path: &Path) -> std::io::Result<(Box<dyn Write>, Option<(Temporary, PathBuf)>)> {
+    if is_standard_output(path) {
+        return Ok((Box::new(std::io::stdout()), None));
     }
-}
-
-impl Write for WriteTarget {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        match self {
-            WriteTarget::Whole(temporary, _) => temporary.file()?.write(bytes),
-            WriteTarget::Through(file) => file.write(bytes),
-            WriteTarget::StandardOutput => std::io::stdout().write(bytes),
+    let (place, own) = followed(path)?;
+    match std::fs::metadata(&place) {
+        Ok(found) if found.is_dir() => Err(ErrorKind::IsADirectory.into()),
+        // Devices and pipes are written directly, and a regular file that is open under a system name such as
+        // `/dev/fd/3`.
+        Ok(found) if !found.is_file() || !own => {
+            Ok((Box::new(OpenOptions::new().append(true).open(&place)?), None))
         }
-    }
-    fn flush(&mut self) -> std::io::Result<()> {
-        match self {
-            WriteTarget::Whole(temporary, _) => temporary.file()?.flush(),
-            WriteTarget::Through(file) => file.flush(),
-            WriteTarget::StandardOutput => std::io::stdout().flush(),
+        Ok(found) if found.permissions().readonly() => Err(ErrorKind::PermissionDenied.into()),
+        _ => {
+            let temporary = Temporary::in_folder(folder_of(&place))?;
+            Ok((Box::new(temporary.0.reopen()?), Some((temporary, place))))
         }
     }
 }
@@ -145,12 +123,8 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// A file under a temporary name. The name is in the list as long as the file exists.
-struct Temporary {
-    /// `None` once the file has its final name.
-    file: Option<NamedTempFile>,
-    name: PathBuf,
-}
+/// A file under a temporary name, which is in the list as long as the file exists.
+struct Temporary(NamedTempFile);
 
 impl Temporary {
     /// A new temporary file. Its permissions follow the user's mask, so that others can read the final file.
@@ -160,31 +134,18 @@ impl Temporary {
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         // Locked before the file exists, so that a signal finds it in the list or not at all.
-        let mut list = temporaries();
+        let mut list = locked(&TEMPORARIES);
         // The original message contains the temporary name, which means nothing to the user.
         let file = builder.tempfile_in(folder).map_err(plain)?;
-        let name = file.path().to_path_buf();
-        list.push(name.clone());
-        Ok(Temporary { file: Some(file), name })
+        list.push(file.path().to_path_buf());
+        Ok(Temporary(file))
     }
 
-    fn file(&mut self) -> std::io::Result<&mut File> {
-        self.file.as_mut().map(NamedTempFile::as_file_mut).ok_or(ErrorKind::NotFound.into())
-    }
-
-    fn persist(mut self, place: &Path) -> std::io::Result<()> {
-        match self.file.take() {
-            Some(file) => file.persist(place).map(drop).map_err(|e| plain(e.error)),
-            None => Err(ErrorKind::NotFound.into()),
-        }
-    }
-}
-
-impl Drop for Temporary {
-    fn drop(&mut self) {
-        // The file first, then its entry.
-        drop(self.file.take());
-        temporaries().retain(|name| *name != self.name);
+    fn persist(self, place: &Path) -> std::io::Result<()> {
+        let name = self.0.path().to_path_buf();
+        self.0.persist(place).map_err(|e| plain(e.error))?;
+        locked(&TEMPORARIES).retain(|other| *other != name);
+        Ok(())
     }
 }
 
@@ -199,18 +160,18 @@ fn plain(error: std::io::Error) -> std::io::Error {
     }
 }
 
-fn temporaries() -> MutexGuard<'static, Vec<PathBuf>> {
-    TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner)
+fn locked<T>(list: &'static Mutex<T>) -> MutexGuard<'static, T> {
+    list.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Removes incomplete files before the process exits. No other file can be started afterwards.
 pub fn remove_temporaries() {
-    let list = temporaries();
+    let list = locked(&TEMPORARIES);
     for path in list.iter() {
         let _ = std::fs::remove_file(path);
     }
     // Only empty folders can be removed.
-    for folder in MADE.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+    for folder in locked(&MADE).iter() {
         let _ = std::fs::remove_dir(folder);
     }
     std::mem::forget(list);
@@ -225,7 +186,7 @@ pub fn prepare_folder(folder: &Path) -> Result<(), Error> {
         .map(PathBuf::from)
         .collect();
     // Innermost first, the order in which they can be removed.
-    MADE.lock().unwrap_or_else(PoisonError::into_inner).extend(missing);
+    locked(&MADE).extend(missing);
     std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
     Temporary::in_folder(folder).map_err(Error::io(folder))?;
     Ok(())
@@ -257,7 +218,7 @@ impl Lock {
             // On a system without file locks, users must keep two studies apart themselves.
             Err(std::fs::TryLockError::Error(_)) => {}
         }
-        temporaries().push(path.clone());
+        locked(&TEMPORARIES).push(path.clone());
         Ok(Lock { path, file: Some(file) })
     }
 }
@@ -266,7 +227,7 @@ impl Drop for Lock {
     fn drop(&mut self) {
         let _ = std::fs::remove_file(&self.path);
         drop(self.file.take());
-        temporaries().retain(|name| *name != self.path);
+        locked(&TEMPORARIES).retain(|name| *name != self.path);
     }
 }
 
@@ -280,7 +241,7 @@ pub fn text_of(path: OsString) -> String {
         Ok(text) => return text,
         Err(path) => PathBuf::from(path),
     };
-    let mut paths = PATHS.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut paths = locked(&PATHS);
     let mut text = path.to_string_lossy().into_owned();
     // Another path may have the same text.
     while paths.iter().any(|(known, other)| *known == text && *other != path) {
@@ -292,7 +253,7 @@ pub fn text_of(path: OsString) -> String {
 
 /// The path that a text represents.
 pub fn path_of(text: &str) -> PathBuf {
-    let paths = PATHS.lock().unwrap_or_else(PoisonError::into_inner);
+    let paths = locked(&PATHS);
     paths.iter().find(|(known, _)| known == text).map_or_else(|| text.into(), |(_, path)| path.clone())
 }
 

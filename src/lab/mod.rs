@@ -41,7 +41,7 @@
 //!     solvers: vec![find("pgs")?, find("soft_step")?],
 //!     ..StudyPlan::quick()
 //! };
-//! let records = study::run(&plan, &|_| (), &|_| ())?;
+//! let records = study::run(&plan, &|_| (), &mut |_, _| Ok(()))?;
 //! let text = String::from_utf8(export::csv(&records, &Environment::current())?)?;
 //! let mut rows = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
 //! let head = rows.next().ok_or("no header")?;
@@ -88,29 +88,29 @@
 //! ```text
 //! error                          what can go wrong
 //! files  overrides  interned     result files; parameters by name; names read from files
-//! units  estimate                human-readable numbers; what a run will take
+//! units  memory                  human-readable numbers; what fits in memory
 //! reference  metrics             certified solutions; errors read from states
 //! scenes  capture  picture       what is simulated, and its known truth; frozen problems; frames drawn
+//! trial                          one run to its verdict
 //! recording                      whole runs in a file, and the page that plays them
 //! study  converge  verify        solver × scene × budget; iterations to a tolerance; hard cases
-//! advise  report                 the cheapest setting; tables, plots, records
+//! report                         tables, plots, records
 //! profile  compare               phases against the roofline, cost by size; two studies side by side
 //! ablate                         what each mechanism of a solver is for
 //! torture                        scenes at random, and what no solver may do in them
 //! ```
 
 pub mod ablate;
-pub mod advise;
 pub mod capture;
 pub mod compare;
 pub mod converge;
 pub mod error;
 #[doc(hidden)]
-pub mod estimate;
-#[doc(hidden)]
 pub mod files;
 #[doc(hidden)]
 pub mod interned;
+#[doc(hidden)]
+pub mod memory;
 pub mod metrics;
 pub mod overrides;
 pub mod picture;
@@ -121,6 +121,7 @@ pub mod report;
 pub mod scenes;
 pub mod study;
 pub mod torture;
+pub mod trial;
 #[doc(hidden)]
 pub mod units;
 pub mod verify;

@@ -46,13 +46,14 @@ const CONSTRAINTS: &[&[&str]] =
     &[&["numerics"], &["records"], &["kernels"], &["joints", "vectors", "impacts"], &["step"]];
 const LAB: &[&[&str]] = &[
     &["error"],
-    &["estimate", "files", "interned", "overrides", "units"],
+    &["files", "interned", "memory", "overrides", "units"],
     &["reference"],
     &["metrics"],
     &["scenes", "capture", "picture"],
+    &["trial"],
     &["recording"],
     &["verify", "study", "converge"],
-    &["advise", "report"],
+    &["report"],
     &["ablate", "profile", "compare", "torture"],
 ];
 

@@ -1,10 +1,15 @@
-//! `simpulse advise`: its recommendation holds, and it reports what it cannot do.
+//! `simpulse advise`: its recommendation holds, it finds out what a file does not say, and it reports what it
+//! cannot do.
 
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::find;
-use simpulse::lab::advise::limits::Limits;
-use simpulse::lab::advise::{SearchPlan, Trial, advise};
-use simpulse::lab::study::{observe, open_scene};
+use simpulse::engine::world::{Order, Settings};
+use simpulse::lab::overrides;
+use simpulse::lab::scenes::Scene;
+use simpulse::lab::scenes::tolerance::GivenTolerances;
+use simpulse::lab::study::answer::Answer;
+use simpulse::lab::study::{self, Record, StudyPlan, observe, open_scene};
+use simpulse::lab::trial::Trial;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -16,69 +21,111 @@ fn text(bytes: &[u8]) -> &str {
     std::str::from_utf8(bytes).unwrap()
 }
 
-/// Nothing here may depend on the clock: the search never runs out of time.
-fn plan(scene: &str, limits: Limits) -> SearchPlan {
-    SearchPlan {
-        impacts: simpulse::engine::constraints::Impacts::Own,
-        scene: scene.to_string(),
-        limits,
+/// A disc on two crates, and a big box dropped beside them.
+const GAME: &str = r#"{ "name": "game", "steps": 300, "bodies": [
+    { "type": "static", "position": [0, -1], "shapes": [{ "box": { "half": [10, 1] } }] },
+    { "type": "dynamic", "position": [-0.6, 0.5], "shapes": [{ "box": { "half": [0.5, 0.5] } }] },
+    { "type": "dynamic", "position": [0.6, 0.5], "shapes": [{ "box": { "half": [0.5, 0.5] } }] },
+    { "type": "dynamic", "position": [0, 1.6], "shapes": [{ "circle": { "radius": 0.5 } }] },
+    { "type": "dynamic", "position": [3, 3], "shapes": [{ "box": { "half": [1.5, 1.5] } }] }
+] }"#;
+
+fn plan(scene: &str, tolerances: GivenTolerances) -> StudyPlan {
+    StudyPlan {
+        scenes: vec![scene.to_string()],
         solvers: ["pgs", "soft_step"].map(|name| find(name).unwrap()).to_vec(),
         widths: vec![LaneWidth::W1, LaneWidth::W8],
+        thorough: true,
+        tolerances,
+        only_given: true,
         steps: Some(60),
         repeats: 1,
-        seed: 1,
-        seconds: 1e9,
+        ..StudyPlan::default()
+    }
+}
+
+fn records(plan: &StudyPlan) -> Vec<Record> {
+    study::run(plan, &|_| (), &mut |_, _| Ok(())).unwrap()
+}
+
+fn settings(record: &Record) -> Settings {
+    let solver = find(record.solver).unwrap();
+    let width = match record.order {
+        Order::Colored => LaneWidth::from_lanes(record.lanes).unwrap(),
+        _ => LaneWidth::W1,
+    };
+    Settings {
+        order: record.order,
+        budget: record.budget,
+        impacts: record.impacts,
+        parameters: overrides::of_words(solver, &record.parameters).unwrap(),
+        ..Settings::new(solver).exactly(width)
     }
 }
 
 #[test]
 fn what_is_recommended_keeps_the_limits_when_it_is_run_again() {
-    // The standard budgets stay within 5 mm on this stack; 2 mm needs a little more.
-    let limits = Limits { penetration: Some(2e-3), truth: Some(0.05), ..Limits::default() };
-    let plan = plan("stack:4", limits);
-    let advice = advise(&plan, &|_| ()).unwrap();
-    let best = advice.best().unwrap();
-    assert!(!advice.is_cut_short && advice.left_out > 0);
-    let width = LaneWidth::from_lanes(best.time.unwrap().lanes).unwrap();
-    let again =
-        observe(open_scene("stack:4", Some(1), Some(60), None).unwrap(), best.setting.settings(width), 0)
-            .unwrap();
-    let errors = again.errors.unwrap();
-    assert_eq!(Some(errors), best.errors);
-    assert!(errors.penetration(false) <= 2e-3 && again.truth.unwrap().error.unwrap() <= 0.05);
-
-    // The recommendation is the fastest finalist that meets the limits, and the finalists are sorted by time.
-    let times: Vec<f64> =
-        advice.finalists.iter().filter(|t| t.is_good()).map(|t| t.time.unwrap().median_ns).collect();
-    assert!(times.is_sorted(), "{times:?}");
-    // Both solvers meet the limits, so both are timed.
-    let solvers = |t: &Trial| t.setting.solver.name;
-    for name in ["pgs", "soft_step"] {
-        assert!(advice.finalists.iter().any(|t| solvers(t) == name), "{name}");
-    }
+    let limits = GivenTolerances { penetration: Some(2e-3), truth: Some(0.05), ..GivenTolerances::default() };
+    let records = records(&plan("stack:4", limits));
+    let answer = Answer::of(&records).unwrap();
+    let best = answer.best().unwrap();
+    let scene = open_scene("stack:4", Some(1), Some(60), None).unwrap();
+    let again = observe(scene, settings(best), 0).unwrap();
+    assert_eq!(again.errors.ok(), best.errors);
+    assert!(best.errors.unwrap().penetration(true) <= 2e-3);
+    assert!(again.truth.unwrap().error.unwrap() <= 0.05);
+    // Both solvers meet the limits.
+    assert_eq!(answer.of_each_solver().len(), 2);
+    // It stands for a minute.
+    assert!(best.later.is_some_and(|later| later.broken.is_none()));
 }
 
 #[test]
 fn a_limit_out_of_reach_has_a_nearest_setting_and_no_advice() {
     // f32 resolves the height of these bodies to 2e-7 m, and settling takes more than that.
-    let limits = Limits { penetration: Some(1e-9), ..Limits::default() };
-    let advice = advise(&plan("stack:3", limits), &|_| ()).unwrap();
-    assert!(advice.best().is_none() && advice.runner_up().is_none());
-    let nearest = advice.nearest().unwrap();
-    assert!(nearest.excess > 1.0 && nearest.excess.is_finite());
-    assert!(advice.trials.iter().all(|t| t.excess >= nearest.excess));
-    // No setting was good and none was too slow, so the whole grid was tried.
-    assert_eq!(advice.left_out, 0);
-    // No step is as fast as a nanosecond, and more work is no faster, so few settings are tried.
-    let limits = Limits { time_ns: Some(1.0), penetration: Some(1.0), ..Limits::default() };
-    let hopeless = advise(&plan("stack:3", limits), &|_| ()).unwrap();
-    assert!(hopeless.best().is_none() && hopeless.trials.len() < advice.trials.len() / 4);
+    let limits = GivenTolerances { penetration: Some(1e-9), ..GivenTolerances::default() };
+    let records = records(&plan("stack:3", limits));
+    let answer = Answer::of(&records).unwrap();
+    assert!(answer.best().is_none());
+    let excess = answer.nearest.unwrap().excess();
+    assert!(excess > 1.0 && excess.is_finite());
+}
+
+#[test]
+fn a_file_that_says_nothing_must_rest_if_the_default_solver_brings_it_to_rest() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("game.json"), GAME).unwrap();
+    let args = ["advise", "game.json", "--max-penetration", "5mm", "--solvers", "pgs,soft_step,shim"];
+    let json = simpulse(folder.path(), &[&args[..], &["--repeats", "1", "--json"]].concat());
+    let json: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    let said = json["found_out"][0].as_str().unwrap();
+    assert!(said.contains("does not say what must hold") && said.contains("rest is required"), "{said}");
+    // Nothing ends below the ground within a minute, under any setting that is named.
+    let scene = Scene::from_json(GAME, "game.json".as_ref()).unwrap();
+    for key in ["best", "runner_up"] {
+        let record: Record = serde_json::from_value(json[key].clone()).unwrap();
+        let trial = Trial { steps: 3600, measured: 0, ..Trial::new(&scene, settings(&record)) };
+        let end = trial.run(&mut |_| Ok(())).unwrap();
+        assert!(end.failure.is_none() && end.broken.is_none());
+        let heights = (1..5).map(|i| end.world.bodies.center(i)[1]);
+        assert!(heights.into_iter().all(|y| y > 0.4), "{key}");
+    }
+    // A body that falls for ever need not rest, and that is said first.
+    let falls = GAME.replace("[3, 3]", "[30, 3]");
+    std::fs::write(folder.path().join("falls.json"), falls).unwrap();
+    let out =
+        simpulse(folder.path(), &["advise", "falls.json", "--max-penetration", "5mm", "--solvers", "shim"]);
+    let first: String = text(&out.stdout).lines().take(3).collect::<Vec<_>>().join(" ");
+    assert!(
+        first.starts_with("falls.json does not say") && first.contains("does not come to rest"),
+        "{first}"
+    );
 }
 
 #[test]
 fn the_program_prints_evidence_and_writes_it() {
     let folder = tempfile::tempdir().unwrap();
-    let common = ["--steps", "60", "--repeats", "1", "--lanes", "1,8", "--seconds", "1e6"];
+    let common = ["--steps", "60", "--repeats", "1", "--lanes", "1,8"];
     let with = |args: &[&str]| simpulse(folder.path(), &[&["advise"], args, &common].concat());
     let limits = ["stack:3", "--max-penetration", "5mm", "--max-time", "1s"];
     let found = with(&limits);
@@ -91,6 +138,7 @@ fn the_program_prints_evidence_and_writes_it() {
         "slower",
         "penetration max",
         "±",
+        "to run it: simpulse run stack:3 --solver ",
     ] {
         assert!(out.contains(part), "'{part}' is not in:\n{out}");
     }
@@ -99,8 +147,7 @@ fn the_program_prints_evidence_and_writes_it() {
     };
     let found = json(&limits);
     assert!(found["best"]["errors"]["held_depth_p99_m"].as_f64().unwrap() <= 5e-3);
-    assert_eq!(found["best"]["keeps_limits"], true);
-    assert_eq!(found["limits"]["time_ns"], 1e9);
+    assert_eq!(found["max_step_ns"], 1e9);
     assert!(found["trials"].as_array().unwrap().len() > 4);
     let cpu = &found["environment"]["cpu"];
     assert!(cpu.is_string(), "{cpu}");
@@ -113,9 +160,13 @@ fn the_program_prints_evidence_and_writes_it() {
         out.contains("none of the settings tried meets the limits") && out.contains("nearest: pgs"),
         "{out}"
     );
-    assert!(out.contains("exceeds its worst limit by a factor of"), "{out}");
+    assert!(out.contains("times its tolerance for penetration"), "{out}");
     let none = json(&limits);
-    assert!(none["best"].is_null() && none["nearest"]["keeps_limits"] == false);
+    assert!(none["best"].is_null() && none["nearest"]["solver"] == "pgs");
+    // A time out of reach.
+    let none = with(&["stack:3", "--max-penetration", "5mm", "--max-time", "1ns", "--solvers", "pgs"]);
+    assert_eq!(none.status.code(), Some(1));
+    assert!(text(&none.stdout).contains("takes "), "{}", text(&none.stdout));
 }
 
 #[test]
@@ -132,11 +183,11 @@ fn bad_requests_are_refused_in_one_line() {
         (&["stack:3", "--max-residual", "1%"], &["max-residual", "'1%'"]),
         (&["stack:3", "--max-reference", "5N"], &["max-reference", "'5N'"]),
         (&["circle_pile:10", "--max-reference", "1mm"], &["max-reference", "circle_pile:10"]),
+        (&["smash", "--max-penetration", "1mm", "--max-rest-speed", "1mm/s"], &["max-rest-speed", "smash"]),
         (&["stack:3", "--max-penetration", "1mm", "--lanes", "3"], &["lanes", "3"]),
         (&["stack:3", "--max-penetration", "1mm", "--solvers", "pgz"], &["'pgz'", "'pgs'"]),
         (&["stack:3", "--max-penetration", "1mm", "--steps", "0"], &["steps", "0"]),
         (&["stack:3", "--max-penetration", "1mm", "--repeats", "0"], &["repeats", "0"]),
-        (&["stack:3", "--max-penetration", "1mm", "--seconds", "0"], &["seconds", "0"]),
     ];
     for (args, parts) in table {
         let output = simpulse(folder.path(), &[&["advise"], *args].concat());

@@ -9,9 +9,11 @@
 //!
 //! Two runs of one binary differ as well, by memory placement, clock rate and load. The measurable part of
 //! this widens every interval ([`Noise`]): a fixed loop, timed between the rounds, measures the speed of the
-//! machine; the scatter of the settings around their common ratio measures placement; the time that threads
-//! waited measures the load. A change of one solver shows in all its settings, so it is detected even below
-//! that noise ([`solvers`]).
+//! machine; the scatter of the settings around their common ratio measures the rest, and it is widened so
+//! that the largest of all settings stays within it. If the threads had to wait, other programs ran, and
+//! these slow all settings of a scene alike for as long as it is timed: by a third where they share a core's
+//! units and caches. Times are then divided by the median ratio of their scene. A change of one solver shows in all its settings, so it
+//! is detected even below that noise ([`solvers`]).
 
 pub mod solvers;
 pub mod text;
@@ -25,6 +27,7 @@ use crate::lab::study::curve::ErrorAxis;
 use crate::lab::study::sample::{Sample, median};
 use serde::Serialize;
 use solvers::SolverChange;
+use std::collections::BTreeMap;
 
 /// Errors below this fraction of their tolerance count as zero (1).
 pub const NEGLIGIBLE: f64 = 0.01;
@@ -98,30 +101,74 @@ pub struct Noise {
     pub machine: f64,
     /// Scatter of the logarithms of the settings' ratios around their median (1); 0 for too few settings.
     pub scatter: f64,
-    /// Fraction of the time that threads waited, in the busier of the two runs (1).
+    /// Fraction of the time that threads waited, in the busier of the two runs (1). It is not part of the
+    /// times.
     pub waited: f64,
-    /// Widening of every interval in both directions, as a logarithm of a ratio (1).
-    pub allowed: f64,
+    /// Widening of every interval toward slower and toward faster, as a logarithm of a ratio (1).
+    pub allowed: [f64; 2],
 }
 
 /// Difference that remains between two runs on an idle machine, because code and data are at other addresses.
 const PLACEMENT: f64 = 0.02;
 
+/// Fraction of the time that threads waited from which a machine counts as busy (1).
+const BUSY: f64 = 0.02;
+
 /// Fewest settings from which scatter is estimated.
 const FEWEST: usize = 8;
 
+/// Probability that a comparison of one program with itself reports any setting as changed, and any solver.
+const FALSE_ALARM: f64 = 0.01;
+
+/// Fraction of the deviations on a side that form its tail, and their smallest number.
+const TAIL: f64 = 0.2;
+const FEWEST_IN_TAIL: usize = 10;
+
 impl Noise {
     /// From all pairs: logarithms of their ratios, ratio of the fixed loop, and fraction of waiting.
-    ///
-    /// Most settings are unchanged, so their scatter is noise. The largest of n normal numbers is below
-    /// √(2 ln n) + 1 standard deviations 19 times in 20.
     fn of(logs: &[f64], machine: f64, waited: f64) -> Self {
         let scatter = if logs.len() < FEWEST { 0.0 } else { scatter(logs) };
-        let most = (2.0 * (logs.len().max(2) as f64).ln()).sqrt() + 1.0;
         // The loop uses neither memory nor vectors, so half of its change may not apply to the settings.
-        let allowed = PLACEMENT + most * scatter + waited + 0.5 * machine.ln().abs();
+        let common = PLACEMENT + 0.5 * machine.ln().abs();
+        let middle = median(logs);
+        // What became faster shows how far chance moves settings that did not become slower, and vice versa.
+        let side = |sign: f64| logs.iter().map(|x| sign * (x - middle)).filter(|x| *x > 0.0).collect();
+        let allowed = [-1.0, 1.0].map(|sign| common + largest(side(sign), logs.len(), scatter));
         Noise { machine, scatter, waited, allowed }
     }
+}
+
+/// Deviation that the largest of `count` unchanged settings exceeds on one side with the probability
+/// [`FALSE_ALARM`]/2, from the deviations on a side.
+///
+/// Hundreds of settings are compared, and a few of them are far from the others: the scatter between runs is
+/// not normal. Beyond a high threshold u most distributions have exponential tails or lighter ones (Pickands
+/// 1975; Balkema and de Haan 1974): with m deviations above u, and s the mean of their excess, the expected
+/// number above u + y is m exp(−y/s). The largest is above it with at most that probability, whatever the
+/// dependence between settings (Bonferroni), so
+///
+/// ```text
+/// y = s ln(2m/α).
+/// ```
+///
+/// With few deviations they count as normal, with the standard deviation σ: from P(|x| > zσ) ≤ exp(−z²/2)
+/// follows z = √(2 ln(n/α)).
+fn largest(mut deviations: Vec<f64>, count: usize, scatter: f64) -> f64 {
+    deviations.sort_by(f64::total_cmp);
+    let tail = (TAIL * deviations.len() as f64) as usize;
+    if tail < FEWEST_IN_TAIL {
+        return scatter * normal_quantile(count);
+    }
+    let (below, above) = deviations.split_at(deviations.len() - tail);
+    let threshold = below.last().copied().unwrap_or(0.0);
+    let excess = above.iter().map(|x| x - threshold).sum::<f64>() / tail as f64;
+    threshold + excess * (2.0 * tail as f64 / FALSE_ALARM).ln()
+}
+
+/// Standard deviations within which all of `count` normal numbers are, except with the probability
+/// [`FALSE_ALARM`].
+fn normal_quantile(count: usize) -> f64 {
+    (2.0 * (count.max(1) as f64 / FALSE_ALARM).ln()).sqrt()
 }
 
 /// Standard deviation of normal numbers, estimated as 1.48 d from their median deviation d.
@@ -199,6 +246,8 @@ impl SettingPair {
 pub struct Comparison {
     /// Noise that was allowed for.
     pub noise: Noise,
+    /// Whether times are divided by the median ratio of their scene, because other programs ran.
+    pub busy: bool,
     /// Median ratio of times over all settings (1); `None` without times.
     pub common: Option<f64>,
     /// Whether times are divided by the common ratio.
@@ -238,11 +287,17 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &CompareOptions) 
             pairs.push(pair(one, other));
         }
     }
-    let (noise, solvers) = (noise(before, after, &pairs), solvers::changes(&pairs));
+    let solvers = solvers::changes(&pairs);
+    let busy = [before, after].into_iter().any(|study| mean(study, |s| s.waited) > BUSY);
+    if busy {
+        divide_out_scenes(&mut pairs);
+    }
+    let noise = noise(before, after, &pairs);
     for time in pairs.iter_mut().filter_map(|p| p.time.as_mut()) {
         time.ratio /= noise.machine;
         let [low, high] = time.interval.map(|bound| bound / noise.machine);
-        time.interval = [low * (-noise.allowed).exp(), high * noise.allowed.exp()];
+        let [slower, faster] = noise.allowed;
+        time.interval = [low * (-slower).exp(), high * faster.exp()];
     }
     let mut ratios: Vec<f64> = pairs.iter().filter_map(|p| p.time.map(|t| t.ratio)).collect();
     ratios.sort_by(f64::total_cmp);
@@ -255,6 +310,7 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &CompareOptions) 
     }
     Comparison {
         noise,
+        busy,
         common,
         relative: options.relative,
         threshold: options.threshold,
@@ -265,13 +321,30 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &CompareOptions) 
     }
 }
 
+/// Divides times by the median ratio of their scene.
+fn divide_out_scenes(pairs: &mut [SettingPair]) {
+    let mut scenes: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    for (scene, time) in pairs.iter().filter_map(|p| Some((&p.scene, p.time?))) {
+        scenes.entry(scene.clone()).or_default().push(time.ratio);
+    }
+    for pair in pairs {
+        if let (Some(time), Some(ratios)) = (&mut pair.time, scenes.get(&pair.scene)) {
+            let common = median(ratios);
+            time.ratio /= common;
+            time.interval = time.interval.map(|bound| bound / common);
+        }
+    }
+}
+
+/// Mean of a quantity over the timed settings of a study.
+fn mean(study: &StudyFile, of: fn(&Sample) -> f64) -> f64 {
+    let values: Vec<f64> = study.records.iter().filter_map(|r| r.sample.as_ref().map(of)).collect();
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
 /// Noise between the two studies.
 fn noise(before: &StudyFile, after: &StudyFile, pairs: &[SettingPair]) -> Noise {
     let logs: Vec<f64> = pairs.iter().filter_map(|p| p.time.map(|t| t.ratio.ln())).collect();
-    let mean = |study: &StudyFile, of: fn(&Sample) -> f64| {
-        let values: Vec<f64> = study.records.iter().filter_map(|r| r.sample.as_ref().map(of)).collect();
-        values.iter().sum::<f64>() / values.len().max(1) as f64
-    };
     let loops = [before, after].map(|study| mean(study, |s| s.yardstick_ns));
     let machine = if loops.iter().all(|ns| *ns > 0.0) { loops[1] / loops[0] } else { 1.0 };
     let waited = mean(before, |s| s.waited).max(mean(after, |s| s.waited));
@@ -417,6 +490,22 @@ mod tests {
         assert_eq!(count(&relative), 1);
     }
 
+    #[test]
+    fn a_heavy_tail_of_chance_is_allowed_for_and_the_changed_side_is_not_part_of_it() {
+        // Laplace numbers have a 10 000 times heavier tail at 5 σ than normal ones: x = ±ln u.
+        let logs: Vec<f64> = (1..=500).map(|i| 0.01 * (f64::from(i) / 501.0).ln()).collect();
+        let both: Vec<f64> = logs.iter().flat_map(|x| [*x, -x]).collect();
+        let calm = Noise::of(&both, 1.0, 0.4);
+        // ln(2·500/α) scales, and nothing for waiting.
+        let expected = PLACEMENT + 0.01 * (2.0 * 500.0 / FALSE_ALARM).ln();
+        assert!(calm.allowed.iter().all(|a| (a / expected - 1.0).abs() < 0.05), "{calm:?} {expected}");
+        // A tenth of the settings became slower: they do not hide themselves.
+        let changed: Vec<f64> =
+            both.iter().enumerate().map(|(i, x)| x + if i % 10 == 0 { 0.3 } else { 0.0 }).collect();
+        let [slower, faster] = Noise::of(&changed, 1.0, 0.4).allowed;
+        assert!(slower < 1.1 * calm.allowed[0] && faster > 2.0 * calm.allowed[1], "{slower} {faster}");
+    }
+
     /// Two studies of one program with `count` settings. Times scatter by `scatter` from run to run, the
     /// machine is slower by the factor `machine` in the second study, and setting 0 is slower by the factor
     /// `slower`.
@@ -461,6 +550,29 @@ mod tests {
             slowed.pairs[0].time.unwrap().verdict(0.05) == Verdict::Worse
         });
         assert!(found.count() >= 9);
+    }
+
+    #[test]
+    fn on_a_busy_machine_a_slow_spell_of_a_scene_is_none_of_its_settings() {
+        let run = |waited: f64, spell: f64, slower: f64| {
+            let of = |i: u32, scene: &str, time: f64| {
+                let mut r = Record { scene: scene.into(), ..record(8, i, time, 1e-3) };
+                r.sample.as_mut().unwrap().waited = waited;
+                r
+            };
+            let calm = (1..=35).map(|i| of(i, "x", 10.0 * if i == 1 { slower } else { 1.0 }));
+            study(calm.chain((1..=5).map(|i| of(i, "y", 20.0 * spell))).collect())
+        };
+        let worse = |c: Comparison| {
+            c.pairs.iter().filter(|p| p.time.unwrap().verdict(0.05) == Verdict::Worse).count()
+        };
+        let busy = compare(&run(0.4, 1.0, 1.0), &run(0.3, 1.3, 1.0), &STRICT);
+        assert!(busy.busy && worse(busy) == 0);
+        // On an idle machine all settings of the scene did become slower.
+        assert_eq!(worse(compare(&run(0.0, 1.0, 1.0), &run(0.0, 1.3, 1.0), &STRICT)), 5);
+        // Not everything is a tie.
+        let found = compare(&run(0.4, 1.0, 1.0), &run(0.3, 1.3, 1.5), &STRICT);
+        assert_eq!((worse(found.clone()), found.regressed()), (1, true));
     }
 
     #[test]

@@ -48,16 +48,17 @@ pub fn changes(pairs: &[SettingPair]) -> Vec<SolverChange> {
             deviations.entry(solver).or_default().extend(logs.iter().map(|log| log - common));
         }
     }
-    let enough = deviations.into_iter().filter(|(_, all)| all.len() >= FEWEST);
-    enough.map(|(solver, all)| change(solver, &all)).collect()
+    deviations.retain(|_, all| all.len() >= FEWEST);
+    let errors = super::normal_quantile(deviations.len());
+    deviations.into_iter().map(|(solver, all)| change(solver, &all, errors)).collect()
 }
 
-/// The median of k normal numbers with standard deviation σ has the standard error √(π/2) σ/√k. Three
-/// standard errors cover 997 of 1000 cases.
-fn change(solver: &'static str, deviations: &[f64]) -> SolverChange {
+/// The median of k normal numbers with standard deviation σ has the standard error √(π/2) σ/√k; `errors` of
+/// them are allowed for.
+fn change(solver: &'static str, deviations: &[f64], errors: f64) -> SolverChange {
     let middle = median(deviations);
     let scatter = super::scatter(deviations);
-    let allowed = super::PLACEMENT + 3.0 * FRAC_PI_2.sqrt() * scatter / (deviations.len() as f64).sqrt();
+    let allowed = super::PLACEMENT + errors * FRAC_PI_2.sqrt() * scatter / (deviations.len() as f64).sqrt();
     let interval = [middle - allowed, middle + allowed].map(f64::exp);
     SolverChange { solver, settings: deviations.len(), ratio: middle.exp(), interval }
 }

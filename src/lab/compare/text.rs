@@ -34,12 +34,16 @@ pub fn text(found: &Comparison, all: bool) -> String {
     );
     let n = found.noise;
     text += &format!(
-        "noise between two runs of one program: {:.1} % (settings scatter by {:.1} %, threads waited {:.1} %; a fixed loop took {:.3} times as long, which is divided out)\n",
-        100.0 * n.allowed.exp_m1(),
+        "noise between two runs of one program: {:.1} % (settings scatter by {:.1} %, and {} are compared; a fixed loop took {:.3} times as long, which is divided out; threads waited {:.1} % of the time, which is not counted)\n",
+        100.0 * n.allowed[0].exp_m1(),
         100.0 * n.scatter,
-        100.0 * n.waited,
-        n.machine
+        found.pairs.len(),
+        n.machine,
+        100.0 * n.waited
     );
+    if found.busy {
+        text += "other programs ran, which slow all settings of a scene alike: times are relative to the median of their scene\n";
+    }
     text += "\n";
     // All widths of a setting end in the same bits, so one of them is enough.
     let own = |p: &SettingPair| (p.scene.clone(), p.solver, p.budget.clone(), p.order);

@@ -6,6 +6,7 @@ use super::table::{PAGE_WIDTH, finish, narrow, table};
 use super::units::{digits, is_emulated, si};
 use crate::engine::solvers::DEFAULT;
 use crate::engine::world::Order;
+use crate::lab::scenes::CATALOG;
 use crate::lab::scenes::holds::HORIZON;
 use crate::lab::scenes::tolerance::Accuracy;
 use crate::lab::study::answer::{Answer, order, same};
@@ -36,7 +37,7 @@ pub fn text(records: &[Record], environment: &Environment, steps: Option<u32>) -
     let mut text = wrapped(&recommendation(&ranking, scenes.len(), steps)) + "\n";
     text += &warnings(records, steps);
     text += &wrapped(&head(records, environment, scenes.len()));
-    text += &format!("\nThe cheapest setting that is good enough\n{}", cheapest(&scenes));
+    text += &format!("\nThe cheapest setting that is good enough\n{}", cheapest(&scenes, records));
     text += &fallen(records);
     text += &format!(
         "\nIts errors in % of the tolerances, and the cheapest settings that are tight and exact\n{}",
@@ -216,7 +217,7 @@ fn head(records: &[Record], environment: &Environment, scenes: usize) -> String 
 }
 
 /// A table with the cheapest setting of each scene.
-fn cheapest(scenes: &[Answer]) -> String {
+fn cheapest(scenes: &[Answer], records: &[Record]) -> String {
     let mut rows = table(&["scene", "solver", "budget", "µs/step", "median", "longest", "next", "slower"]);
     let mut notes = String::new();
     for answer in scenes {
@@ -235,7 +236,21 @@ fn cheapest(scenes: &[Answer]) -> String {
                     worst(nearest)
                 ));
             }
-            (None, None) => notes += &format!("{}: no setting holds\n", answer.scene),
+            (None, None) => {
+                notes += &format!("{}: no setting holds\n", answer.scene);
+                // The run that lasts longest shows most.
+                let own = records.iter().filter(|r| r.scene == answer.scene);
+                if let Some(last) = own.max_by_key(|r| r.failed_step().unwrap_or(0)) {
+                    let why = last.failure.map(|f| f.to_string()).or(last.broken.map(|b| b.to_string()));
+                    notes += &wrapped(&format!(
+                        "  longest is {}, {}: {}; to see it: {}\n",
+                        last.solver,
+                        budget(last),
+                        why.unwrap_or_default(),
+                        last.command_to_see(known_or_file(answer.scene))
+                    ));
+                }
+            }
         }
     }
     let any = scenes.iter().any(|a| a.best().is_some());
@@ -243,8 +258,14 @@ fn cheapest(scenes: &[Answer]) -> String {
     table + &notes
 }
 
+/// The name of a scene of the catalog; a placeholder for the file of another one.
+fn known_or_file(scene: &str) -> &str {
+    let stem = scene.split(':').next();
+    if CATALOG.iter().any(|entry| Some(entry.name) == stem) { scene } else { "FILE.json" }
+}
+
 /// Solver, budget with lanes, mean, median and longest step.
-fn setting(record: &Record) -> [String; 5] {
+pub fn setting(record: &Record) -> [String; 5] {
     let time = |ns: fn(&crate::lab::study::sample::Sample) -> f64| {
         record.sample.as_ref().map_or("–".to_string(), |sample| digits(ns(sample) / 1e3))
     };
@@ -279,7 +300,7 @@ fn percent(share: f64) -> String {
 }
 
 /// Why a setting is not good enough.
-fn worst(record: &Record) -> String {
+pub fn worst(record: &Record) -> String {
     if let Some(why) = record.fails_later() {
         return why;
     }
@@ -526,7 +547,7 @@ mod tests {
     #[test]
     fn what_falls_later_stands_beside_the_winner_with_its_step() {
         let later = |mark: bool| {
-            let broken = mark.then_some(Broken { mark: Mark::Fell, step: 800 });
+            let broken = mark.then_some(Broken { mark: Mark::Fell, step: 800, body: None });
             Some(Later { steps: 3600, seconds: 60.0, broken, rest_speed_m_s: None })
         };
         let records = [

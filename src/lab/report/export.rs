@@ -321,6 +321,7 @@ pub fn settings(plan: &StudyPlan) -> Value {
         "set": plan.overrides,
         "sweep": plan.sweep,
         "tolerance": plan.tolerances,
+        "found_to_rest": plan.rests,
         "seed": plan.seed,
         "world": standard,
         "constants": {

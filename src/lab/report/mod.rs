@@ -14,8 +14,6 @@ pub mod orders;
 pub mod plot;
 #[doc(hidden)]
 pub mod profiles;
-#[doc(hidden)]
-pub mod savings;
 pub mod study_file;
 #[doc(hidden)]
 pub mod style;
@@ -27,7 +25,7 @@ pub use crate::lab::units;
 
 use crate::lab::error::Error;
 use crate::lab::files;
-use crate::lab::study::Record;
+use crate::lab::study::{Record, found};
 use std::path::{Path, PathBuf};
 use study_file::StudyFile;
 
@@ -36,7 +34,31 @@ const SWEEP: &str = "sweep.svg";
 const SPEED: &str = "speed_vs_error.svg";
 const PROFILES: &str = "profiles.svg";
 
-/// All tables of a study: per scene, at equal time and at equal error, and the performance profiles.
+/// Files of a study, besides its recordings.
+const FILES: [&str; 8] =
+    [SWEEP, SPEED, PROFILES, "tables.txt", "study.csv", study_file::NAME, found::NAME, html::NAME];
+
+/// Moves the study that a folder holds to `previous/N` below it, with the first free number N, so that no study
+/// is ever overwritten. Returns the new place; `None` if the folder holds no study.
+pub fn keep_previous(folder: &Path) -> Result<Option<PathBuf>, Error> {
+    if !folder.join(study_file::NAME).exists() {
+        return Ok(None);
+    }
+    let mut numbered = (1..).map(|n: u32| folder.join("previous").join(n.to_string()));
+    let Some(place) = numbered.find(|place| !place.exists()) else { return Ok(None) };
+    std::fs::create_dir_all(&place).map_err(Error::io(&place))?;
+    let entries = std::fs::read_dir(folder).map_err(Error::io(folder))?;
+    for name in entries.filter_map(|entry| Some(entry.ok()?.file_name())) {
+        let text = name.to_string_lossy();
+        if FILES.contains(&&*text) || (text.starts_with("replay-") && text.ends_with(".rec")) {
+            let path = folder.join(&name);
+            std::fs::rename(&path, place.join(&name)).map_err(Error::io(&path))?;
+        }
+    }
+    Ok(Some(place))
+}
+
+/// All tables of a study: per scene, and the performance profiles.
 pub fn tables(records: &[Record]) -> String {
     if sweep::is_sweep(records) {
         return sweep::tables(records);
@@ -48,8 +70,7 @@ pub fn tables(records: &[Record]) -> String {
     }
     text += &answer::later_table(records);
     text += &table::impacts_table(records);
-    let (slices, profiles) = (profiles::slice_tables(records), profiles::profile_table(records));
-    text + &slices + "\n" + &profiles
+    text + &profiles::profile_table(records)
 }
 
 /// Writes `tables.txt`, `study.csv`, `study.json` and pictures (`speed_vs_error.svg` and `profiles.svg`, or

@@ -1,14 +1,12 @@
-//! `profiles.svg` and the slices: solvers compared over all scenes.
+//! `profiles.svg`: solvers compared over all scenes.
 
 use super::style::{LEGEND_ROW, legend_places, solver_color, solver_legend};
 use super::table::{finish, table};
-use super::units::{digits, si};
 use crate::lab::error::Error;
 use crate::lab::picture::axes::{Area, Drawn, GRID, INK, LogScale, with_dark, write, write_upwards};
 use crate::lab::study::Record;
-use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, SettingSample, solvers_of};
+use crate::lab::study::curve::{ErrorAxis, solvers_of};
 use crate::lab::study::profile::Profile;
-use crate::lab::study::slices::{Slice, equal_error, equal_time};
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
@@ -134,64 +132,6 @@ pub fn profile_table(records: &[Record]) -> String {
         + &finish(rows, 3)
 }
 
-/// Maximum number of scenes in one table of slices.
-const SCENES_PER_TABLE: usize = 6;
-
-/// Equal time and equal error: a line per solver and a column per scene.
-pub fn slice_tables(records: &[Record]) -> String {
-    let solvers = solvers_of(records);
-    let scenes: Vec<&[Record]> = records.chunk_by(|a, b| a.scene == b.scene).collect();
-    let mut text = String::new();
-    let mut add = |heading: &str, of: fn(&[Record], ErrorAxis) -> Option<Slice<'_>>, equal_time: bool| {
-        text += heading;
-        for axis in ErrorAxis::ALL {
-            let slices: Vec<Slice> = scenes.iter().filter_map(|scene| of(scene, axis)).collect();
-            let tables = slices.len().div_ceil(SCENES_PER_TABLE).max(1);
-            for part in slices.chunks(slices.len().div_ceil(tables).max(1)) {
-                let mut header = vec![axis.name()];
-                header.extend(part.iter().map(|slice| slice.scene));
-                let mut rows = table(&header);
-                let columns: Vec<_> =
-                    part.iter().map(|slice| slice_column(slice, &solvers, equal_time)).collect();
-                for (i, first) in std::iter::once("at").chain(solvers.iter().copied()).enumerate() {
-                    let cells = columns.iter().map(|column| column[i].clone());
-                    rows.add_row(std::iter::once(first.to_string()).chain(cells).collect::<Vec<_>>());
-                }
-                text += &format!("\n{}", finish(rows, 1));
-            }
-        }
-    };
-    add(
-        "Equal time: the smallest error of any setting that takes at most this long (— none; * the smallest)\n",
-        equal_time,
-        true,
-    );
-    add(
-        "\nEqual error: µs per step of the fastest setting with at most this error (— none; * the fastest and its ties)\n",
-        equal_error,
-        false,
-    );
-    text
-}
-
-/// The limit, then the value of each solver.
-fn slice_column(slice: &Slice, solvers: &[&str], equal_time: bool) -> Vec<String> {
-    let error = |value: f64| match si(value, slice.unit) {
-        text if value <= ERROR_FLOOR => format!("≤ {text}"),
-        text => text,
-    };
-    let time = |ns: f64| digits(1e-3 * ns);
-    let show = |s: &SettingSample| if equal_time { error(s.error) } else { time(s.time) };
-    let cell = |solver: &&str| {
-        let sample =
-            slice.values.iter().find(|(name, _)| name == solver).and_then(|(_, sample)| sample.as_ref());
-        let mark = if slice.best.contains(solver) { " *" } else { "" };
-        sample.map_or("—".to_string(), |sample| show(sample) + mark)
-    };
-    let at = if equal_time { format!("{} µs", time(slice.at)) } else { error(slice.at) };
-    std::iter::once(at).chain(solvers.iter().map(cell)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -200,17 +140,6 @@ mod tests {
     fn two_solvers() -> Vec<Record> {
         let soft = |substeps, time, error| Record { solver: "soft_step", ..record(8, substeps, time, error) };
         vec![record(8, 1, 10.0, 0.1), record(8, 2, 20.0, 0.001), soft(1, 10.1, 0.1), soft(2, 20.2, 0.001)]
-    }
-
-    #[test]
-    fn the_slices_say_who_is_tied() {
-        let text = slice_tables(&two_solvers());
-        // At an error of 10 mm, both take between 10 and 20 µs, within 3 %.
-        let equal_error = &text[text.find("Equal error").unwrap()..];
-        let penetration = &equal_error[equal_error.find("penetration").unwrap()..];
-        let line = |start: &str| penetration.lines().find(|l| l.starts_with(start)).unwrap();
-        assert!(line("pgs").ends_with(" *") && line("soft_step").ends_with(" *"), "{text}");
-        assert!(text.contains("Equal time") && text.contains("—"), "{text}");
     }
 
     #[test]

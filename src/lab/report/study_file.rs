@@ -53,6 +53,17 @@ impl StudyFile {
         }
     }
 
+    /// The rest of a study that was interrupted, together with what was finished before.
+    pub fn after(self, earlier: &StudyFile) -> StudyFile {
+        let parts = [earlier, &self].into_iter().flat_map(|part| match part.parts.is_empty() {
+            true => vec![ShardInfo { environment: part.environment.clone(), scenes: part.scenes() }],
+            false => part.parts.clone(),
+        });
+        let parts = parts.filter(|part| !part.scenes.is_empty()).collect();
+        let records = earlier.records.iter().cloned().chain(self.records).collect();
+        StudyFile { environment: earlier.environment.clone(), parts, records, ..self }
+    }
+
     /// Merges parts with the same settings into one study; `names` are the names of the parts in errors.
     /// Scenes are interleaved, the first of every part first, which restores the order of a study that was
     /// split.

@@ -14,7 +14,7 @@ contact points and at rest; the contact-law residual, rms, in weights of the lig
 the scene's reference value (– if none is known); the speed at rest.  Runs were not extended to a minute: later
 failures do not show.  budget: substeps; then velocity, relaxation and position sweeps per substep.
 µs/step: mean over the run, its median, its longest step, ± median deviation of a repeat; all settings of a scene
-were timed interleaved.
+were timed interleaved.  ns/contact: mean step ÷ mean number of contacts; B/contact: size of prepared records.
 ";
 
 /// Whether these are records of a sweep.
@@ -77,6 +77,8 @@ fn scene_text(scene: &[Record], swept: Swept) -> String {
         "median",
         "longest",
         "±",
+        "ns/contact",
+        "B/contact",
         "penetration",
         "residual",
         "reference",
@@ -144,6 +146,10 @@ fn row(record: &Record) -> Vec<String> {
         sample.map_or_else(nothing, |l| digits(l.median_ns / 1e3)),
         sample.map_or_else(nothing, |l| digits(l.worst_ns / 1e3)),
         sample.map_or_else(nothing, |l| digits(l.spread_ns / 1e3)),
+        sample
+            .filter(|l| l.load.contacts > 0.0)
+            .map_or_else(nothing, |l| digits(l.mean_ns / l.load.contacts)),
+        sample.map_or_else(nothing, |l| digits(l.load.bytes_per_contact)),
         errors.map_or_else(nothing, |e| si(e.penetration(record.tolerances.rest.is_some()), "m")),
         errors.map_or_else(nothing, |e| ratio(e.law_rms_lighter)),
         match record.truth {

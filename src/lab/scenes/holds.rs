@@ -49,11 +49,14 @@ pub struct Broken {
     pub mark: Mark,
     /// Step, from 1.
     pub step: u64,
+    /// The body that violated it; `None` for a condition on all bodies together.
+    pub body: Option<usize>,
 }
 
 impl std::fmt::Display for Broken {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} at step {}", self.mark.word(), self.step)
+        let body = self.body.map_or(String::new(), |body| format!("body {body} "));
+        write!(f, "{body}{} at step {}", self.mark.word(), self.step)
     }
 }
 
@@ -198,20 +201,22 @@ impl HoldWatch {
             return;
         }
         let now = centers(world);
-        let broken = self.demands.iter().find(|d| !self.is_met(d, world, &now)).map(Demand::mark);
+        let broken = self.demands.iter().find_map(|d| Some((d.mark(), self.violation(d, world, &now)?)));
         let through = || {
             let paths = self.previous.iter().zip(&now).enumerate();
             let mut paths = paths.filter(|(i, _)| world.bodies.is_dynamic(*i));
-            paths.any(|(_, (&from, &to))| {
+            let through = paths.find(|(_, (from, to))| {
+                let (from, to) = (**from, **to);
                 self.walls.are_crossed(from, to)
                     || self
                         .moving
                         .iter()
                         .any(|m| m.walls.are_crossed(m.last.inside(from), m.pose(world).inside(to)))
-            })
+            });
+            through.map(|(i, _)| (Mark::Tunneled, Some(i)))
         };
-        let mark = broken.or_else(|| through().then_some(Mark::Tunneled));
-        self.broken = mark.map(|mark| Broken { mark, step: world.step_index });
+        let broken = broken.or_else(through);
+        self.broken = broken.map(|(mark, body)| Broken { mark, step: world.step_index, body });
         if self.demands.iter().any(|d| matches!(d, Demand::GainsNoEnergy)) {
             self.energy[1] = self.energy[1].max(energies(world)[0]);
         }
@@ -219,34 +224,44 @@ impl HoldWatch {
         self.previous = now;
     }
 
+    /// The body that violates a condition, or `Some(None)` if all of them do together; `None` if it is met.
     /// NaN meets no condition.
-    fn is_met(&self, demand: &Demand, world: &World, now: &[DVec2]) -> bool {
+    fn violation(&self, demand: &Demand, world: &World, now: &[DVec2]) -> Option<Option<usize>> {
+        let dynamic = || (0..now.len()).filter(|&i| world.bodies.is_dynamic(i));
+        let together = |met: bool| (!met).then_some(None);
         match demand {
-            Demand::Stands => self.touching.iter().all(|&[a, b]| {
-                let moved = (now[b] - now[a]) - (self.start[b] - self.start[a]);
-                moved.length() <= LEFT * self.reach[a].min(self.reach[b])
-            }),
+            Demand::Stands => {
+                let is_met = |&&[a, b]: &&[usize; 2]| {
+                    let moved = (now[b] - now[a]) - (self.start[b] - self.start[a]);
+                    moved.length() <= LEFT * self.reach[a].min(self.reach[b])
+                };
+                let pair = self.touching.iter().find(|pair| !is_met(pair))?;
+                let moved = |i: &usize| now[*i].distance(self.start[*i]);
+                Some(pair.iter().copied().max_by(|a, b| moved(a).total_cmp(&moved(b))))
+            }
             Demand::StaysStacked => {
-                let dynamic: Vec<usize> = (0..now.len()).filter(|&i| world.bodies.is_dynamic(i)).collect();
-                dynamic.windows(2).all(|pair| {
+                let dynamic: Vec<usize> = dynamic().collect();
+                let is_met = |pair: &[usize]| {
                     let apart = now[pair[1]] - now[pair[0]];
                     let limit = LEFT * self.reach[pair[0]].min(self.reach[pair[1]]);
                     apart.x.abs() <= limit && apart.y > 0.0
-                })
+                };
+                dynamic.windows(2).find(|pair| !is_met(pair)).map(|pair| Some(pair[1]))
             }
-            Demand::StaysWithin(limit) => (0..now.len())
-                .filter(|&i| world.bodies.is_dynamic(i))
-                .all(|i| now[i].distance(self.start[i]) <= *limit),
-            Demand::Contains(Outside(count)) => count(&View::of(world)) == 0,
-            Demand::Inside([low, high]) => (0..now.len()).filter(|&i| world.bodies.is_dynamic(i)).all(|i| {
-                let inside = |k: usize| (low[k]..=high[k]).contains(&now[i][k]);
-                inside(0) && inside(1)
-            }),
-            Demand::Rests => true,
+            Demand::StaysWithin(limit) => {
+                let is_met = |i: &usize| now[*i].distance(self.start[*i]) <= *limit;
+                dynamic().find(|i| !is_met(i)).map(Some)
+            }
+            Demand::Contains(Outside(count)) => together(count(&View::of(world)) == 0),
+            Demand::Inside([low, high]) => {
+                let inside = |i: usize, k: usize| (low[k]..=high[k]).contains(&now[i][k]);
+                dynamic().find(|&i| !(inside(i, 0) && inside(i, 1))).map(Some)
+            }
+            Demand::Rests => None,
             Demand::GainsNoEnergy => {
                 let [kinetic, potential] = energies(world);
                 let [start, most, lift] = self.energy;
-                kinetic + potential - start <= GAIN * most.max(kinetic) + lift
+                together(kinetic + potential - start <= GAIN * most.max(kinetic) + lift)
             }
         }
     }

@@ -33,21 +33,20 @@ impl BudgetGrid {
             if used && !list.is_empty() { list.to_vec() } else { vec![own] }
         };
         let uses = variant.uses;
+        let velocity = or(&self.velocity_iterations, uses.velocity, standard.velocity_iterations);
+        let relax = or(&self.relax_iterations, uses.relax, standard.relax_iterations);
+        let position = or(&self.position_iterations, uses.position, standard.position_iterations);
         let mut budgets = Vec::new();
-        for &substeps in &or(&self.substeps, true, standard.substeps) {
-            for &velocity_iterations in
-                &or(&self.velocity_iterations, uses.velocity, standard.velocity_iterations)
+        for substeps in or(&self.substeps, true, standard.substeps) {
+            for (&velocity_iterations, &relax_iterations) in
+                velocity.iter().flat_map(|v| relax.iter().map(move |r| (v, r)))
             {
-                for &relax_iterations in &or(&self.relax_iterations, uses.relax, standard.relax_iterations) {
-                    for &position_iterations in
-                        &or(&self.position_iterations, uses.position, standard.position_iterations)
-                    {
-                        let budget =
-                            Budget { substeps, velocity_iterations, relax_iterations, position_iterations };
-                        check(&budget, variant)?;
-                        if !budgets.contains(&budget) {
-                            budgets.push(budget);
-                        }
+                for &position_iterations in &position {
+                    let budget =
+                        Budget { substeps, velocity_iterations, relax_iterations, position_iterations };
+                    check(&budget, variant)?;
+                    if !budgets.contains(&budget) {
+                        budgets.push(budget);
                     }
                 }
             }
@@ -71,6 +70,17 @@ fn halved_and_doubled(variant: &Variant) -> [Budget; 3] {
             }
         }
     })
+}
+
+/// Sweeps in one step.
+pub fn sweeps(budget: &Budget, variant: &Variant) -> u32 {
+    let each = [
+        (variant.uses.velocity, budget.velocity_iterations),
+        (variant.uses.relax, budget.relax_iterations),
+        (variant.uses.position, budget.position_iterations),
+    ];
+    let per_substep = each.iter().filter(|e| e.0).fold(0_u32, |sum, e| sum.saturating_add(e.1));
+    budget.substeps.saturating_mul(per_substep)
 }
 
 /// Rejects a kind of sweep that none of `solvers` makes, and names the solvers that do. `option` is

@@ -92,8 +92,7 @@ pub struct SettingSample<'a> {
 
 /// The settings of a solver on one scene.
 ///
-/// The settings are separate runs, so curves are not interpolated. The result of a solver in a given time, or
-/// within a given error, is the result of one of its settings.
+/// The settings are separate runs, so curves are not interpolated.
 #[derive(Clone, Debug)]
 pub struct Curve<'a> {
     /// Name of the solver.
@@ -152,20 +151,6 @@ pub fn curves(records: &[Record], axis: ErrorAxis) -> Vec<Curve<'_>> {
 }
 
 impl<'a> Curve<'a> {
-    /// The setting with the smallest error among those that take at most `time` (ns). Of equal ones, the
-    /// fastest. `None` if all take longer.
-    pub fn best_within(&self, time: f64) -> Option<SettingSample<'a>> {
-        let within = self.samples.iter().filter(|s| s.time <= time);
-        within.copied().min_by(|a, b| a.error.total_cmp(&b.error).then(a.time.total_cmp(&b.time)))
-    }
-
-    /// The fastest setting among those with an error of at most `error`. Of equally fast ones, the one with
-    /// the smallest error. `None` if all errors are larger.
-    pub fn fastest_within(&self, error: f64) -> Option<SettingSample<'a>> {
-        let within = self.samples.iter().filter(|s| s.error <= error);
-        within.copied().min_by(|a, b| a.time.total_cmp(&b.time).then(a.error.total_cmp(&b.error)))
-    }
-
     /// The Pareto-optimal settings of the solver in time and error, the fastest first.
     pub fn front(&self) -> Vec<SettingSample<'a>> {
         let mut sorted = self.samples.clone();
@@ -195,30 +180,10 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_curve_answers_everywhere_beyond_its_least_setting() {
-        let records = settings(&[(10.0, 1.0), (100.0, 0.01)]);
-        let found = curves(&records, ErrorAxis::Penetration);
-        let c = &found[0];
-        // No setting runs in less time than the fastest one.
-        assert_eq!(at(c.best_within(9.9e3)), None);
-        // Between two settings, the cheaper one counts; nothing is interpolated.
-        assert_eq!(at(c.best_within(10e3)), Some((10.0, 1.0)));
-        assert_eq!(at(c.best_within(99e3)), Some((10.0, 1.0)));
-        assert_eq!(at(c.best_within(100e3)), Some((100.0, 0.01)));
-        // Spare time does no harm.
-        assert_eq!(at(c.best_within(1e9)), Some((100.0, 0.01)));
-        assert_eq!(at(c.fastest_within(1e3)), Some((10.0, 1.0)));
-        assert_eq!(at(c.fastest_within(0.5)), Some((100.0, 0.01)));
-        assert_eq!(at(c.fastest_within(0.0099)), None);
-    }
-
-    #[test]
     fn a_larger_budget_need_not_be_slower_or_better() {
         let records = settings(&[(10.0, 0.1), (30.0, 0.4), (8.0, 0.01), (8.0, 0.02), (20.0, 0.01)]);
         let found = curves(&records, ErrorAxis::Penetration);
         let c = &found[0];
-        assert_eq!(at(c.best_within(1e9)), Some((8.0, 0.01)));
-        assert_eq!(at(c.fastest_within(1.0)), Some((8.0, 0.01)));
         let front: Vec<_> = c.front().into_iter().map(|s| at(Some(s)).unwrap()).collect();
         assert_eq!(front, [(8.0, 0.01)]);
     }

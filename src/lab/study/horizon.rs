@@ -11,12 +11,12 @@ use crate::engine::lanes::LaneWidth;
 use crate::engine::solvers::find;
 use crate::engine::world::Settings;
 use crate::lab::error::Error;
-use crate::lab::metrics::Observation;
 use crate::lab::metrics::rest::REST_WINDOW;
 use crate::lab::overrides;
 use crate::lab::scenes::Loaded;
-use crate::lab::scenes::holds::{Broken, HORIZON, HoldWatch, Mark};
+use crate::lab::scenes::holds::{Broken, HORIZON, Mark};
 use crate::lab::scenes::tolerance::Accuracy;
+use crate::lab::trial::Trial;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -26,31 +26,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub fn later(loaded: &Loaded, settings: Settings) -> Result<Later, Error> {
     let scene = &loaded.scene;
     let steps = ((HORIZON / scene.dt).ceil() as u64).max(u64::from(scene.steps));
-    let observed = (REST_WINDOW / scene.dt).round().max(1.0) as u64;
-    let seconds = steps as f64 * scene.dt;
-    let mut later = Later { steps, seconds, broken: None, rest_speed_m_s: None };
-    let mut world = scene.build(Settings { record_impulses: false, timed: false, ..settings })?;
-    let mut watch = HoldWatch::new(&world, loaded.demands.clone());
-    let mut observation = None;
-    for step in 0..steps {
-        if step + observed >= steps {
-            observation.get_or_insert_with(|| Observation::new(&world));
-        }
-        if let Err(divergence) = world.step() {
-            later.broken = Some(Broken { mark: Mark::BlewUp, step: divergence.step });
-            return Ok(later);
-        }
-        watch.observe(&world);
-        if let Some(broken) = watch.broken() {
-            later.broken = Some(broken);
-            return Ok(later);
-        }
-        if let Some(observation) = &mut observation {
-            observation.observe(&world);
-        }
-    }
-    later.rest_speed_m_s = observation.map(|o| o.errors().rest_velocity);
-    Ok(later)
+    let measured = (REST_WINDOW / scene.dt).round().max(1.0) as u64;
+    let settings = Settings { record_impulses: false, timed: false, ..settings };
+    let demands = loaded.demands.clone();
+    let trial = Trial { demands, steps, measured, until_broken: true, ..Trial::new(scene, settings) };
+    let found = trial.run(&mut |_| Ok(()))?;
+    let diverged = found.failure.map(|d| Broken { mark: Mark::BlewUp, step: d.step, body: Some(d.body) });
+    let broken = diverged.or(found.broken);
+    let rest_speed_m_s = found.errors.filter(|_| broken.is_none()).map(|e| e.rest_velocity);
+    Ok(Later { steps, seconds: steps as f64 * scene.dt, broken, rest_speed_m_s })
 }
 
 /// Calls `work` for each item of a list, on all cores. Results are in the order of the list.

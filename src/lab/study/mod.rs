@@ -14,8 +14,6 @@ pub mod answer;
 pub mod budget;
 pub mod compare;
 #[doc(hidden)]
-pub mod cost;
-#[doc(hidden)]
 pub mod curve;
 pub mod found;
 #[doc(hidden)]
@@ -35,32 +33,29 @@ pub mod ranking;
 pub mod record;
 #[doc(hidden)]
 pub mod sample;
-#[doc(hidden)]
-pub mod savings;
 pub mod search;
-#[doc(hidden)]
-pub mod slices;
 pub mod sweep;
 #[doc(hidden)]
 pub mod telling;
 
-use crate::engine::constraints::Impacts;
+use crate::engine::constraints::{Features, Impacts};
 use crate::engine::lanes::LaneWidth;
-use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::{VARIANTS, Variant, find};
-use crate::engine::world::{Criterion, Divergence, Order, Quantity, Settings, World};
+use crate::engine::world::{Criterion, Divergence, Order, Quantity, Settings};
 use crate::lab::error::Error;
-use crate::lab::metrics::{Errors, Observation};
+use crate::lab::metrics::Errors;
 use crate::lab::overrides;
-use crate::lab::scenes::holds::{Broken, HoldWatch};
+use crate::lab::scenes::holds::Broken;
 use crate::lab::scenes::{Loaded, Scene};
+use crate::lab::trial::{Trial, TrialOutcome};
 use compare::Ratio;
-use found::TunedBudget;
+use found::{Found, FoundBudgets, TunedBudget};
+use horizon::in_parallel;
 use interleave::Interleaved;
 pub use plan::{StudyPlan, is_path, open_scene};
 pub use record::{FailedAt, Fronts, Record, TruthError, mark_fronts};
 use sample::Sample;
-use std::sync::Mutex;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use sweep::Swept;
 
@@ -102,34 +97,36 @@ pub fn left_out(ran: &[&str]) -> Vec<&'static str> {
 /// State of a running study, for a progress bar.
 #[derive(Clone, Debug)]
 pub struct Progress {
-    /// Number of runs started before this one.
+    /// Number of parts of the work that were finished before this one.
     pub done: usize,
-    /// Total number of runs.
+    /// Number of parts.
     pub total: usize,
-    /// Description of the current run.
+    /// Description of the current part.
     pub what: String,
 }
 
-/// The settings that share an error run per order: one cell for each scene, value of a sweep, solver and
-/// budget.
-struct ErrorCell<'a> {
-    /// Index of the scene, and of the value of the sweep.
-    scene: [usize; 2],
+/// Parts of the work on a scene, for the progress bar.
+const PARTS: usize = 1000;
+
+/// The settings that share an error run per order: one cell for each value of a sweep, solver and budget.
+#[derive(Clone, Copy)]
+struct ErrorCell {
+    /// Index of the value of the sweep, and the value.
+    point: usize,
     swept: Option<Swept>,
-    name: &'a str,
     solver: &'static Variant,
     impacts: Impacts,
-    budget: Budget,
-    parameters: Parameters,
+    tuned: TunedBudget,
     /// Whether the cell runs at its widest lanes only, see [`StudyPlan::widest_alone`].
     widest_alone: bool,
 }
 
-impl ErrorCell<'_> {
+impl ErrorCell {
     /// Its budget, and the parameters that differ from the solver's defaults.
     fn text(&self) -> String {
-        let budget = budget::with_impacts(budget::brief(&self.budget, self.solver), self.impacts);
-        let parameters = overrides::brief(self.solver, &self.parameters);
+        let budget = budget::brief(&self.tuned.budget, self.solver);
+        let budget = budget::with_impacts(budget, self.impacts);
+        let parameters = overrides::brief(self.solver, &self.tuned.parameters);
         if parameters.is_empty() { budget } else { format!("{budget} {parameters}") }
     }
 }
@@ -147,70 +144,82 @@ pub struct RunOutcome {
     pub hash: u64,
 }
 
-/// Runs the plan. Returns one record per scene, solver, budget, order and width, in that order. `finished`
-/// receives the records of a scene as soon as they are complete.
+/// Runs the plan, scene by scene. Returns one record per scene, solver, budget, order and width, in that
+/// order. `finished` receives the records of a scene, and the settings that a search found for it, as soon as
+/// they are complete; its error ends the study.
 ///
 /// Errors: anything that [`StudyPlan::check`] rejects. A run that diverges is a record, not an error.
 pub fn run(
     plan: &StudyPlan,
     progress: &(dyn Fn(Progress) + Sync),
-    finished: &dyn Fn(&[Record]),
+    finished: &mut dyn FnMut(&[Record], &[FoundBudgets]) -> Result<(), Error>,
 ) -> Result<Vec<Record>, Error> {
     plan.check()?;
-    let points = plan.points();
-    let mut cells = Vec::new();
-    let mut scenes: Vec<Vec<Loaded>> = Vec::new();
+    let (mut records, total) = (Vec::new(), PARTS * plan.scenes.len());
     for (i, name) in plan.scenes.iter().enumerate() {
-        let mut variants = Vec::new();
-        for (k, &swept) in points.iter().enumerate() {
-            let mut loaded = plan.open_at(name, swept)?;
-            loaded.tolerances = loaded.tolerances.with(&plan.tolerances);
-            for &solver in plan.solvers.iter().filter(|solver| loaded.scene.runs_on(solver).is_ok()) {
-                for &impacts in plan.impacts_on(&loaded.scene) {
-                    let candidates = plan.candidates(&loaded.scene.name, solver, impacts, swept)?;
-                    let (bodies, steps) = (loaded.scene.bodies.len(), loaded.scene.steps);
-                    for TunedBudget { budget, parameters } in candidates {
-                        let widest_alone =
-                            plan.widest_alone(&loaded.scene.name, bodies, steps, &budget, solver);
-                        let scene = [i, k];
-                        cells.push(ErrorCell {
-                            scene,
-                            swept,
-                            name,
-                            solver,
-                            impacts,
-                            budget,
-                            parameters,
-                            widest_alone,
-                        });
-                    }
-                }
-            }
-            variants.push(loaded);
+        let tell = |share: f64, what: String| {
+            progress(Progress { done: PARTS * i + (PARTS as f64 * share.min(1.0)) as usize, total, what });
+        };
+        let mut plan = plan.clone();
+        if plan.thorough {
+            let found =
+                Found { entries: search::search(&plan, name, &|share, what| tell(0.7 * share, what))? };
+            plan.found = Arc::new(found);
         }
-        scenes.push(variants);
-    }
-    let done = AtomicUsize::new(0);
-    let total = cells.len() * plan.orders.len() + scenes.len() * plan.repeats as usize;
-    let tell = |what: String| progress(Progress { done: done.fetch_add(1, Ordering::Relaxed), total, what });
-    let timed: Vec<u32> =
-        scenes.iter().map(|variants| timing_steps(plan, variants.iter().map(|v| &v.scene))).collect();
-    let outcomes = error_runs(plan, &cells, &timed, &tell)?;
-    let mut records = Vec::new();
-    for (i, variants) in scenes.iter().enumerate() {
-        let own = cells.iter().zip(&outcomes).filter(|(cell, _)| cell.scene[0] == i);
-        let rows: Vec<RecordRow> = own.flat_map(|(cell, outcomes)| rows(plan, cell, outcomes)).collect();
-        let mut own = timed_records(plan, variants, timed[i], &rows, &tell)?;
-        if plan.steps.is_some() {
-            leave_out_unseen(&mut own, &variants[0].scene);
-        }
-        if plan.sweep.is_none() && variants[0].rests() {
-            horizon::run_on(plan, plan.scenes[i].as_str(), &mut own, &tell)?;
-        }
-        mark_fronts(&mut own);
-        finished(&own);
+        let begun = if plan.thorough { 0.7 } else { 0.0 };
+        let own = scene_records(&plan, name, &|share, what| tell(begun + (1.0 - begun) * share, what))?;
+        finished(&own, if plan.thorough { &plan.found.entries } else { &[] })?;
         records.extend(own);
     }
+    Ok(records)
+}
+
+/// The records of one scene. `tell` receives the finished share of the work and the name of the next part.
+fn scene_records(
+    plan: &StudyPlan,
+    name: &str,
+    tell: &(dyn Fn(f64, String) + Sync),
+) -> Result<Vec<Record>, Error> {
+    let mut cells = Vec::new();
+    let mut variants = Vec::new();
+    for (point, &swept) in plan.points().iter().enumerate() {
+        let loaded = plan.open_at(name, swept)?;
+        let scene = &loaded.scene;
+        for &solver in plan.solvers.iter().filter(|solver| scene.runs_on(solver).is_ok()) {
+            for &impacts in plan.impacts_on(scene) {
+                for tuned in plan.candidates(&scene.name, solver, impacts, swept)? {
+                    let widest_alone = plan.widest_alone(scene, &tuned.budget, solver);
+                    cells.push(ErrorCell { point, swept, solver, impacts, tuned, widest_alone });
+                }
+            }
+        }
+        variants.push(loaded);
+    }
+    let steps = timing_steps(plan, variants.iter().map(|v| &v.scene));
+    let jobs: Vec<(&ErrorCell, Order)> =
+        cells.iter().flat_map(|cell| plan.orders.iter().map(move |&order| (cell, order))).collect();
+    let (done, total) = (AtomicUsize::new(0), (jobs.len() + 1).max(2) as f64);
+    let outcomes = in_parallel(&jobs, |&(cell, order)| {
+        let share = done.fetch_add(1, Ordering::Relaxed) as f64 / total;
+        tell(0.5 * share, format!("errors {name} · {} · {}", cell.solver.name, cell.text()));
+        let width = match order {
+            Order::Colored => plan.widths.iter().copied().max().unwrap_or(LaneWidth::W1),
+            _ => LaneWidth::W1,
+        };
+        observe(plan.open_at(name, cell.swept)?, settings(plan, cell, order, width), steps)
+    })?;
+    let with_outcome = jobs.iter().zip(&outcomes);
+    let rows: Vec<RecordRow> =
+        with_outcome.flat_map(|(&(cell, order), outcome)| rows(plan, cell, order, outcome)).collect();
+    let mut records =
+        timed_records(plan, &variants, steps, &rows, &|share, what| tell(0.5 + 0.4 * share, what))?;
+    if plan.steps.is_some() {
+        leave_out_unseen(&mut records, &variants[0].scene);
+    }
+    if plan.sweep.is_none() && variants[0].rests() {
+        horizon::run_on(plan, name, &mut records, &|what| tell(0.95, what))?;
+    }
+    mark_fronts(&mut records);
     Ok(records)
 }
 
@@ -229,16 +238,21 @@ fn leave_out_unseen(records: &mut [Record], scene: &Scene) {
 
 /// Settings of a cell for one order and one width.
 fn settings(plan: &StudyPlan, cell: &ErrorCell, order: Order, width: LaneWidth) -> Settings {
-    let mut parameters = cell.parameters;
+    let mut parameters = cell.tuned.parameters;
     if let Some((sweep, point)) = plan.sweep.as_ref().zip(cell.swept) {
         // Errors were ruled out when the plan was checked.
         let _ = sweep.set(point.value, &mut parameters, cell.solver);
     }
     Settings {
         order,
-        budget: cell.budget,
+        budget: cell.tuned.budget,
         impacts: cell.impacts,
         parameters,
+        extra_features: plan
+            .sweep
+            .as_ref()
+            .zip(cell.swept)
+            .map_or(Features::NONE, |(s, at)| s.features(at.value)),
         ..Settings::new(cell.solver).exactly(width)
     }
 }
@@ -248,130 +262,67 @@ fn timing_steps<'a>(plan: &StudyPlan, scenes: impl IntoIterator<Item = &'a Scene
     scenes.into_iter().map(|scene| scene.steps).fold(plan.timing_steps, u32::min)
 }
 
-/// Runs every cell in every order, on all cores; `[cell][order]`. `timed`: steps of a timing run of each
-/// scene.
-fn error_runs(
-    plan: &StudyPlan,
-    cells: &[ErrorCell],
-    timed: &[u32],
-    tell: &(dyn Fn(String) + Sync),
-) -> Result<Vec<Vec<RunOutcome>>, Error> {
-    let jobs: Vec<(usize, Order)> =
-        (0..cells.len()).flat_map(|cell| plan.orders.iter().map(move |&order| (cell, order))).collect();
-    let next = AtomicUsize::new(0);
-    let found = Mutex::new(vec![None; jobs.len()]);
-    let work = || {
-        loop {
-            let job = next.fetch_add(1, Ordering::Relaxed);
-            let Some(&(cell, order)) = jobs.get(job) else { return Ok::<(), Error>(()) };
-            let ErrorCell { scene, name, solver, budget, .. } = &cells[cell];
-            tell(format!("errors {name} · {} · {}", solver.name, budget::brief(budget, solver)));
-            let outcome = error_run(plan, &cells[cell], order, timed[scene[0]])?;
-            if let Ok(mut found) = found.lock() {
-                found[job] = Some(outcome);
-            }
-        }
-    };
-    let threads = std::thread::available_parallelism().map_or(1, |n| n.get()).min(jobs.len());
-    std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-        workers
-            .into_iter()
-            .try_for_each(|w| w.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-    })?;
-    let found = found.into_inner().unwrap_or_default();
-    let outcomes: Vec<RunOutcome> = found.into_iter().flatten().collect();
-    Ok(outcomes.chunks(plan.orders.len()).map(<[RunOutcome]>::to_vec).collect())
-}
-
-fn error_run(plan: &StudyPlan, cell: &ErrorCell, order: Order, timed: u32) -> Result<RunOutcome, Error> {
-    let loaded = plan.open_at(cell.name, cell.swept)?;
-    let width = match order {
-        Order::Colored => plan.widths.iter().copied().max().unwrap_or(LaneWidth::W1),
-        _ => LaneWidth::W1,
-    };
-    observe(loaded, settings(plan, cell, order, width), timed)
-}
-
 /// Runs a scene to its end and measures its errors. The hash is taken after step `hash_at`.
-pub fn observe(loaded: Loaded, settings: Settings, hash_at: u32) -> Result<RunOutcome, Error> {
-    observe_while(loaded, settings, hash_at, &|_, _| true)
+pub fn observe(mut loaded: Loaded, settings: Settings, hash_at: u32) -> Result<RunOutcome, Error> {
+    let settings = Settings { record_impulses: true, observe_rule: true, ..settings };
+    let mut hash = 0;
+    let found = Trial::of(&mut loaded, settings).run(&mut |world| {
+        if world.step_index == u64::from(hash_at) {
+            hash = world.state_hash();
+        }
+        Ok(())
+    })?;
+    Ok(RunOutcome::new(found, hash))
 }
 
 /// The same up to the first violated requirement. Also returns the work of an average step: its sweeps and
 /// substeps.
-fn observe_until_broken(loaded: Loaded, settings: Settings) -> Result<(RunOutcome, f64), Error> {
-    let (steps, work) = (std::cell::Cell::new(0.0), std::cell::Cell::new(0.0));
+fn observe_until_broken(mut loaded: Loaded, settings: Settings) -> Result<(RunOutcome, f64), Error> {
+    let settings = Settings { record_impulses: true, observe_rule: true, ..settings };
     let substeps = f64::from(settings.budget.substeps);
-    let outcome = observe_while(loaded, settings, 0, &|world, watch| {
-        steps.set(steps.get() + 1.0);
-        work.set(work.get() + world.counts.sweeps as f64 + substeps);
-        watch.broken().is_none()
+    let (mut steps, mut sweeps) = (0_u64, 0);
+    let trial = Trial { until_broken: true, ..Trial::of(&mut loaded, settings) };
+    let found = trial.run(&mut |world| {
+        if world.step_index > 0 {
+            (steps, sweeps) = (steps + 1, sweeps + world.counts.sweeps);
+        }
+        Ok(())
     })?;
-    Ok((outcome, work.get() / f64::max(steps.get(), 1.0)))
+    let steps = steps as f64;
+    let work = (sweeps as f64 + steps * substeps) / steps.max(1.0);
+    Ok((RunOutcome::new(found, 0), work))
 }
 
-/// The same, as long as `goes_on` returns true after a step.
-fn observe_while(
-    loaded: Loaded,
-    settings: Settings,
-    hash_at: u32,
-    goes_on: &dyn Fn(&World, &HoldWatch) -> bool,
-) -> Result<RunOutcome, Error> {
-    let Loaded { scene, mut truth, demands, .. } = loaded;
-    let mut world = scene.build(Settings { record_impulses: true, observe_rule: true, ..settings })?;
-    let mut observation = Observation::new(&world);
-    let mut watch = HoldWatch::new(&world, demands);
-    let mut hash = 0;
-    let failed = |divergence, hash| RunOutcome { errors: Err(divergence), truth: None, broken: None, hash };
-    for step in 1..=scene.steps {
-        if let Err(divergence) = world.step() {
-            return Ok(failed(divergence, hash));
-        }
-        observation.observe(&world);
-        watch.observe(&world);
-        if let Some(blow_up) = observation.blown_up() {
-            return Ok(failed(blow_up, hash));
-        }
-        if let Some(truth) = &mut truth {
-            truth.observer.observe(&world);
-        }
-        if step == hash_at {
-            hash = world.state_hash();
-        }
-        if !goes_on(&world, &watch) {
-            break;
-        }
+impl RunOutcome {
+    fn new(found: TrialOutcome, hash: u64) -> Self {
+        let TrialOutcome { errors, failure, truth, broken, .. } = found;
+        let errors = failure.map_or(Ok(errors.unwrap_or_default()), Err);
+        RunOutcome { broken: broken.filter(|_| errors.is_ok()), errors, truth, hash }
     }
-    Ok(RunOutcome {
-        errors: Ok(observation.errors()),
-        truth: truth.as_ref().map(TruthError::of),
-        broken: watch.broken(),
-        hash,
-    })
 }
 
 /// Source of a record.
 struct RecordRow<'a> {
-    cell: &'a ErrorCell<'a>,
+    cell: &'a ErrorCell,
     order: Order,
     width: LaneWidth,
     outcome: &'a RunOutcome,
 }
 
-/// All orders and widths of a cell.
-fn rows<'a>(plan: &StudyPlan, cell: &'a ErrorCell, outcomes: &'a [RunOutcome]) -> Vec<RecordRow<'a>> {
-    let mut rows = Vec::new();
-    for (&order, outcome) in plan.orders.iter().zip(outcomes) {
-        let widths: &[LaneWidth] = match order {
-            Order::Colored if cell.widest_alone => &plan.widths[plan.widths.len() - 1..],
-            _ if cell.widest_alone => &[],
-            Order::Colored => &plan.widths,
-            _ => &[LaneWidth::W1],
-        };
-        rows.extend(widths.iter().map(|&width| RecordRow { cell, order, width, outcome }));
-    }
-    rows
+/// All widths of a cell in an order.
+fn rows<'a>(
+    plan: &StudyPlan,
+    cell: &'a ErrorCell,
+    order: Order,
+    outcome: &'a RunOutcome,
+) -> impl Iterator<Item = RecordRow<'a>> {
+    let widths = match order {
+        Order::Colored if cell.widest_alone => plan.widths[plan.widths.len() - 1..].to_vec(),
+        _ if cell.widest_alone => Vec::new(),
+        Order::Colored => plan.widths.clone(),
+        _ => vec![LaneWidth::W1],
+    };
+    widths.into_iter().map(move |width| RecordRow { cell, order, width, outcome })
 }
 
 /// Times all settings of a scene that did not diverge, in common rounds. `variants`: the scene at each value
@@ -381,10 +332,10 @@ fn timed_records(
     variants: &[Loaded],
     steps: u32,
     rows: &[RecordRow],
-    tell: &dyn Fn(String),
+    tell: &dyn Fn(f64, String),
 ) -> Result<Vec<Record>, Error> {
     let running: Vec<usize> = (0..rows.len()).filter(|&i| rows[i].outcome.errors.is_ok()).collect();
-    let variant = |row: &RecordRow| &variants[row.cell.scene[1]];
+    let variant = |row: &RecordRow| &variants[row.cell.point];
     let chosen = running.iter().map(|&i| {
         let row = &rows[i];
         (&variant(row).scene, settings(plan, row.cell, row.order, row.width))
@@ -392,7 +343,7 @@ fn timed_records(
     let mut interleaved = Interleaved::new(chosen.collect(), steps, plan.seed);
     let name = &variants[0].scene.name;
     for pass in 1..=plan.repeats {
-        tell(format!("times {name} · pass {pass}"));
+        tell(f64::from(pass - 1) / f64::from(plan.repeats), format!("times {name} · pass {pass}"));
         interleaved.run(1)?;
     }
     let place = |i: usize| running.binary_search(&i).ok();
@@ -441,7 +392,7 @@ fn record_of(
         solver: cell.solver.name,
         order: *order,
         lanes: width.lanes(),
-        budget: cell.budget,
+        budget: cell.tuned.budget,
         budget_text: cell.text(),
         impacts: cell.impacts,
         parameters: overrides::words(cell.solver, &parameters),

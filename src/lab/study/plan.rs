@@ -1,21 +1,21 @@
 //! The plan of a study, and its checks.
 
-use super::budget::BudgetGrid;
-use super::cost;
+use super::budget::{self, BudgetGrid};
 use super::found::{Found, TunedBudget};
 use super::sweep::{QuantitySweep, Swept};
-use super::{DEFAULT_SCENES, default_solvers};
+use super::{DEFAULT_SCENES, default_solvers, horizon};
 use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::params::Budget;
-use crate::engine::solvers::Variant;
-use crate::engine::world::Order;
+use crate::engine::solvers::{DEFAULT, Variant, find};
+use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
-use crate::lab::estimate;
-use crate::lab::files;
 use crate::lab::overrides::{self, Override};
-use crate::lab::scenes::tolerance::GivenTolerances;
+use crate::lab::scenes::holds::Demand;
+use crate::lab::scenes::tolerance::{GivenTolerances, Tolerance, Tolerances};
 use crate::lab::scenes::{self, Loaded, Scene};
+use crate::lab::units::si;
+use crate::lab::{files, memory};
 use std::sync::Arc;
 
 /// Everything that a study runs.
@@ -35,12 +35,19 @@ pub struct StudyPlan {
     pub budgets: BudgetGrid,
     /// Settings to try if no budgets are given.
     pub found: Arc<Found>,
+    /// Whether the settings of each solver on each scene are [searched](super::search) first.
+    pub thorough: bool,
     /// Solver parameters, by name.
     pub overrides: Vec<Override>,
     /// The swept quantity; `None` in a study of budgets.
     pub sweep: Option<QuantitySweep>,
     /// Tolerances that override the scenes' own.
     pub tolerances: GivenTolerances,
+    /// Whether errors without a tolerance in [`tolerances`](Self::tolerances) are not limited. The speed of a
+    /// scene that must come to rest always is.
+    pub only_given: bool,
+    /// Scenes that must come to rest although their files do not say so, see [`Self::find_out`].
+    pub rests: Vec<String>,
     /// Steps of an error run; `None` for the scene's own number.
     pub steps: Option<u32>,
     /// Maximum number of steps in a timing run.
@@ -51,8 +58,11 @@ pub struct StudyPlan {
     pub seed: u64,
 }
 
-/// Estimated time of timing a setting in one lane (s) above which that run is left out.
-const LONG: f64 = 1.0;
+/// Sweeps × bodies of timing a setting in one lane, about a second, above which that run is left out.
+const LONG: f64 = 1.7e7;
+
+/// Sweeps that take as long as the rest of a step.
+const OTHERS: f64 = 6.0;
 
 impl Default for StudyPlan {
     fn default() -> Self {
@@ -64,9 +74,12 @@ impl Default for StudyPlan {
             impacts: vec![Impacts::Own, Impacts::Waves],
             budgets: BudgetGrid::default(),
             found: Found::shipped(),
+            thorough: false,
             overrides: Vec::new(),
             sweep: None,
             tolerances: GivenTolerances::default(),
+            only_given: false,
+            rests: Vec::new(),
             steps: None,
             timing_steps: 300,
             repeats: 3,
@@ -112,11 +125,18 @@ impl StudyPlan {
         let mut names = Vec::new();
         for name in &self.scenes {
             // All points of a sweep share one scene name.
-            let mut scene = None;
+            let (mut scene, mut settings) = (None, 0);
             for point in self.points() {
-                scene = Some(self.open_at(name, point)?.scene);
+                let own = self.open_at(name, point)?.scene;
+                for solver in self.solvers.iter().filter(|solver| own.runs_on(solver).is_ok()) {
+                    settings += self.candidates(&own.name, solver, self.impacts[0], point)?.len();
+                }
+                scene = Some(own);
             }
             let Some(scene) = scene else { continue };
+            let worlds = settings * self.impacts_on(&scene).len() * (self.widths.len() + self.orders.len());
+            let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
+            memory::check(name, scene.bodies.len(), worlds, threads)?;
             if self.solvers.iter().all(|solver| scene.runs_on(solver).is_err()) {
                 scene.runs_on(self.solvers[0])?;
             }
@@ -149,8 +169,74 @@ impl StudyPlan {
         if bounces { &self.impacts } else { &self.impacts[..self.impacts.len().min(1)] }
     }
 
+    /// Opens a scene, with the tolerances of the plan.
     pub(super) fn open(&self, name: &str) -> Result<Loaded, Error> {
-        open_scene(name, Some(self.seed), self.steps, None)
+        Ok(self.judged(name, open_scene(name, Some(self.seed), self.steps, None)?))
+    }
+
+    /// Replaces tolerances, and requires rest where that was found out.
+    fn judged(&self, name: &str, mut loaded: Loaded) -> Loaded {
+        if self.rests.iter().any(|own| own == name) {
+            loaded.demands.push(Demand::Rests);
+            loaded.tolerances.rest = Some(Tolerances::resting(&loaded.scene));
+            loaded.unchecked = vec!["a reference value: the file has none".to_string()];
+        }
+        loaded.tolerances = loaded.tolerances.with(&self.tolerances);
+        if self.only_given {
+            let tolerances = &mut loaded.tolerances;
+            let unlimited = Tolerance::new(f64::MAX, "not limited");
+            if self.tolerances.penetration.is_none() {
+                tolerances.penetration = unlimited;
+            }
+            if self.tolerances.residual.is_none() {
+                tolerances.residual = unlimited;
+            }
+            tolerances.truth = tolerances.truth.filter(|_| self.tolerances.truth.is_some());
+        }
+        loaded
+    }
+
+    /// Finds out what the files of the plan do not say: a scene without `expect` runs for a minute under the
+    /// default solver at its standard setting. If it comes to rest, every setting has to bring it to rest and
+    /// is checked for a minute, as if its file said so. Returns a sentence for each scene.
+    ///
+    /// Errors: a scene that cannot be opened or built.
+    pub fn find_out(&mut self) -> Result<Vec<String>, Error> {
+        let mut said = Vec::new();
+        for name in self.scenes.clone() {
+            let loaded = open_scene(&name, Some(self.seed), None, None)?;
+            if !is_path(&name) || loaded.scene.expect.is_some() {
+                continue;
+            }
+            let settings = Settings::new(find(DEFAULT)?);
+            let later = horizon::later(&loaded, settings)?;
+            let limit = self.tolerances.rest.unwrap_or(Tolerances::resting(&loaded.scene).value);
+            let found = match (later.broken, later.rest_speed_m_s) {
+                (None, Some(speed)) if speed <= limit => {
+                    self.rests.push(name.clone());
+                    format!(
+                        "it comes to rest under {DEFAULT} ({} rms in the last second of a minute), so rest is \
+                         required: it must come to rest and stand for a minute",
+                        si(speed, "m/s")
+                    )
+                }
+                (broken, speed) => {
+                    let why = match (broken, speed) {
+                        (Some(broken), _) => broken.to_string(),
+                        (None, speed) => {
+                            format!("moves at {} after a minute", si(speed.unwrap_or(f64::NAN), "m/s"))
+                        }
+                    };
+                    format!(
+                        "under {DEFAULT} it does not come to rest ({why}), so no rest is required: only that \
+                         nothing blows up or passes through static or kinematic bodies, for its own {} steps",
+                        self.steps.unwrap_or(loaded.scene.steps)
+                    )
+                }
+            };
+            said.push(format!("{name} does not say what must hold (\"expect\"). Found out: {found}."));
+        }
+        Ok(said)
     }
 
     /// The points of a sweep in order; a single `None` without a sweep.
@@ -168,7 +254,7 @@ impl StudyPlan {
         let Scene { steps, dt: own, .. } = self.open(&name)?.scene;
         // The duration stays the same up to rounding; the last step may start before its end.
         let steps = (f64::from(steps) * own / dt * (1.0 - 1e-9)).ceil().max(1.0);
-        open_scene(&name, Some(self.seed), Some(steps as u32), Some(dt))
+        Ok(self.judged(&name, open_scene(&name, Some(self.seed), Some(steps as u32), Some(dt))?))
     }
 
     /// The budgets of a solver. A point of a sweep has exactly one.
@@ -199,20 +285,13 @@ impl StudyPlan {
 
     /// Whether a setting runs only in colored order at the widest lanes. This applies to found settings whose
     /// timing in one lane takes more than [`LONG`], unless lanes or orders were given.
-    pub(super) fn widest_alone(
-        &self,
-        scene: &str,
-        bodies: usize,
-        steps: u32,
-        budget: &Budget,
-        solver: &Variant,
-    ) -> bool {
+    pub(super) fn widest_alone(&self, scene: &Scene, budget: &Budget, solver: &Variant) -> bool {
         let own = StudyPlan::default();
-        let is_found = self.searched() && self.found.of(scene, solver, Impacts::Own).is_some();
+        let is_found = self.searched() && self.found.of(&scene.name, solver, Impacts::Own).is_some();
         let is_open = is_found && self.widths == own.widths && self.orders == own.orders;
-        let step = estimate::step(bodies, cost::sweeps(budget, solver), 1);
-        let timed = f64::from(steps.min(self.timing_steps)) * f64::from(self.repeats);
-        is_open && timed * step > LONG
+        let sweeps = OTHERS + f64::from(budget::sweeps(budget, solver));
+        let timed = f64::from(scene.steps.min(self.timing_steps)) * f64::from(self.repeats);
+        is_open && timed * scene.bodies.len() as f64 * sweeps > LONG
     }
 
     /// Settings of a solver to run on a scene: the found ones with the plan's parameters. The plan's budgets
@@ -290,7 +369,6 @@ pub fn open_scene(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::world::Settings;
 
     #[test]
     fn wide_lanes_run_by_themselves_where_they_are_native() {

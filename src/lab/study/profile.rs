@@ -18,12 +18,12 @@ use super::curve::{ErrorAxis, solvers_of};
 use super::sample::Sample;
 
 /// For each solver, the least time of its `allowed` records of one scene, relative to that of the fastest
-/// solver. A time that ties with the least is 1. `None` if no record is allowed.
+/// solver (1), and whether it ties with that time. `None` if no record is allowed.
 pub fn times_of_fastest(
     scene: &[Record],
     solvers: &[&str],
     allowed: impl Fn(&Record) -> bool,
-) -> Vec<Option<f64>> {
+) -> Vec<Option<(f64, bool)>> {
     let less = |a: &&Sample, b: &&Sample| a.cost_ns().total_cmp(&b.cost_ns());
     let own = |solver: &&str| {
         let allowed = scene.iter().filter(|r| r.solver == *solver && allowed(r));
@@ -31,7 +31,7 @@ pub fn times_of_fastest(
     };
     let times: Vec<Option<&Sample>> = solvers.iter().map(own).collect();
     let Some(least) = times.iter().flatten().copied().min_by(less) else { return vec![None; solvers.len()] };
-    let ratio = |t: &Sample| if compare(t, least).is_eq() { 1.0 } else { t.cost_ns() / least.cost_ns() };
+    let ratio = |t: &Sample| (t.cost_ns() / least.cost_ns(), compare(t, least).is_eq());
     times.into_iter().map(|time| time.map(ratio)).collect()
 }
 
@@ -64,7 +64,7 @@ impl Profile {
             let found = times_of_fastest(group, &solvers, within);
             solvable += found.iter().any(Option::is_some) as usize;
             for ((_, ratios), ratio) in ratios.iter_mut().zip(found) {
-                ratios.extend(ratio);
+                ratios.extend(ratio.map(|(ratio, ties)| if ties { 1.0 } else { ratio }));
             }
         }
         ratios.iter_mut().for_each(|(_, r)| r.sort_by(f64::total_cmp));

@@ -1,16 +1,17 @@
 //! Ranking of the solvers over all scenes, and its robustness.
 //!
 //! On a scene, t(p) is the least time in which any setting of the solver p holds and meets every tolerance of
-//! the scene. Its speed there is min over p of t(p)/t(p): 1 for the fastest solver and for those that
-//! [tie](super::compare) with it, ½ for one that takes twice as long, 0 for one that is never good enough.
-//! The score of a solver is its mean speed over all scenes. A scene that no solver solves lowers every score
-//! alike.
+//! the scene. Its speed there is min over p of t(p)/t(p): 1 for the fastest solver, ½ for one that takes twice
+//! as long, 0 for one that is never good enough. The score of a solver is its mean speed over all scenes. A
+//! scene that no solver solves lowers every score alike. [Ties](super::compare) count where solvers are called
+//! fastest, not in the score.
 //!
 //! The choice of scenes and tolerances is arbitrary. Every score therefore has a range: over all studies with
 //! one scene left out, and with half or twice the tolerances. Only a solver that is first in all of them
-//! [leads](Ranking::leader).
+//! [leads](Ranking::leader), by more than a negligible difference of time.
 
 use super::Record;
+use super::compare::TIE;
 use super::curve::solvers_of;
 use super::profile::times_of_fastest;
 use crate::lab::scenes::tolerance::Accuracy;
@@ -61,27 +62,28 @@ pub const CLOSE: f64 = 1.5;
 /// Variations of the tolerances, as multiples of the scenes' own (1).
 const FACTORS: [f64; 2] = [0.5, 2.0];
 
-/// Speeds of the solvers on a scene, relative to the fastest; 0 if none of a solver's settings is good
-/// enough.
-fn speeds(scene: &[Record], solvers: &[&'static str], tolerance: f64) -> Vec<f64> {
+/// Speed of each solver on a scene, relative to the fastest, and whether it ties with that one. Speed 0 if
+/// none of a solver's settings is good enough.
+fn speeds(scene: &[Record], solvers: &[&'static str], tolerance: f64) -> Vec<(f64, bool)> {
     let times = times_of_fastest(scene, solvers, |r| r.excess() <= tolerance);
-    times.into_iter().map(|time| time.map_or(0.0, |t| 1.0 / t)).collect()
+    times.into_iter().map(|time| time.map_or((0.0, false), |(t, ties)| (1.0 / t, ties))).collect()
 }
 
 /// Mean speed of each solver over the scenes, without one of them if given.
-fn scores(speeds: &[Vec<f64>], without: Option<usize>) -> Vec<f64> {
-    let kept: Vec<&Vec<f64>> =
+fn scores(speeds: &[Vec<(f64, bool)>], without: Option<usize>) -> Vec<f64> {
+    let kept: Vec<&Vec<(f64, bool)>> =
         speeds.iter().enumerate().filter(|(i, _)| Some(*i) != without).map(|(_, s)| s).collect();
     let count = kept.first().map_or(0, |s| s.len());
-    (0..count).map(|k| kept.iter().map(|s| s[k]).sum::<f64>() / kept.len() as f64).collect()
+    (0..count).map(|k| kept.iter().map(|s| s[k].0).sum::<f64>() / kept.len() as f64).collect()
 }
 
 /// Ranks the solvers over the scenes of `records`.
 pub fn ranking(records: &[Record]) -> Ranking {
     let solvers = solvers_of(records);
     let scenes: Vec<&[Record]> = records.chunk_by(|a, b| a.scene == b.scene).collect();
-    let by_factor =
-        |factor: f64| -> Vec<Vec<f64>> { scenes.iter().map(|s| speeds(s, &solvers, factor)).collect() };
+    let by_factor = |factor: f64| -> Vec<Vec<(f64, bool)>> {
+        scenes.iter().map(|s| speeds(s, &solvers, factor)).collect()
+    };
     let own = by_factor(1.0);
     let mut tried: Vec<Vec<f64>> = FACTORS.into_iter().map(|f| scores(&by_factor(f), None)).collect();
     if scenes.len() > 1 {
@@ -97,24 +99,24 @@ pub fn ranking(records: &[Record]) -> Ranking {
         };
         let least = tried.iter().map(|t| t[k]).fold(f64::INFINITY, f64::min);
         let most = tried.iter().map(|t| t[k]).fold(0.0, f64::max);
-        let failing = scenes.iter().zip(&own).filter(|(_, speeds)| speeds[k] == 0.0);
+        let failing = scenes.iter().zip(&own).filter(|(_, speeds)| speeds[k].0 == 0.0);
         Standing {
             solver,
             score: whole[k],
             range: [least, most],
             holds: scenes.iter().filter(|s| s.iter().any(|r| r.solver == solver && r.holds())).count(),
             good: Accuracy::ALL.map(good),
-            fastest: times.clone().filter(|&speed| speed >= 1.0).count(),
-            close: times.filter(|&speed| speed * CLOSE >= 1.0).count(),
+            fastest: times.clone().filter(|&(_, ties)| ties).count(),
+            close: times.filter(|&(speed, _)| speed * CLOSE >= 1.0).count(),
             fails_on: failing.map(|(scene, _)| scene[0].scene.clone()).collect(),
         }
     };
     let mut standings: Vec<Standing> = solvers.iter().enumerate().map(standing).collect();
     standings.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.solver.cmp(b.solver)));
-    // Solvers that share first place all count.
+    // Solvers that share first place all count; so do those behind by a difference that is no verdict.
     let is_first = |k: usize| {
         let best = |t: &[f64]| t.iter().copied().fold(0.0, f64::max);
-        tried.iter().any(|t| t[k] > 0.0 && t[k] >= best(t))
+        tried.iter().any(|t| t[k] > 0.0 && t[k] * (1.0 + TIE) >= best(t))
     };
     let first: Vec<&'static str> = (0..solvers.len()).filter(|&k| is_first(k)).map(|k| solvers[k]).collect();
     let first = standings.iter().map(|s| s.solver).filter(|name| first.contains(name)).collect();
@@ -148,12 +150,14 @@ mod tests {
         ];
         let found = ranking(&records);
         let [b, a] = &found.standings[..] else { panic!("{found:?}") };
-        assert_eq!((b.solver, b.score, b.holds, b.good), ("b", 0.5, 2, [2, 2, 0]));
+        // Ties count as fastest, and the score is of times.
+        let tied = 1.0 / ((1e3 * 10.1) / (1e3 * 10.0));
+        assert_eq!((b.solver, b.score, b.holds, b.good), ("b", (1.0 + tied) / 4.0, 2, [2, 2, 0]));
         assert_eq!((a.solver, a.score, a.holds, a.good), ("a", 1.25 / 4.0, 3, [2, 2, 1]));
         assert_eq!(([b.fastest, b.close], [a.fastest, a.close]), ([2, 2], [1, 1]));
         assert_eq!(a.fails_on, ["z", "w"]);
-        // Without x both score 1/3, without z or w two thirds.
-        assert_eq!((b.range, a.range), ([1.0 / 3.0, 2.0 / 3.0], [0.25 / 3.0, 1.25 / 3.0]));
+        // Without x b scores a third of its tie, without z or w two thirds.
+        assert_eq!((b.range, a.range), ([tied / 3.0, (1.0 + tied) / 3.0], [0.25 / 3.0, 1.25 / 3.0]));
         // They share first place without x.
         assert_eq!((found.first.clone(), found.leader()), (vec!["b", "a"], None));
     }
@@ -182,8 +186,10 @@ mod tests {
         for _ in 0..3 {
             records.rotate_left(1);
             let names: Vec<_> = ranking(&records).standings.into_iter().map(|s| s.solver).collect();
-            assert_eq!(names, ["a", "b", "c"]);
+            assert_eq!(names, ["b", "c", "a"]);
         }
+        // All three tie, so nobody leads.
+        assert_eq!(ranking(&records).first.len(), 3);
         assert!(ranking(&[]).standings.is_empty() && ranking(&[]).leader().is_none());
     }
 }

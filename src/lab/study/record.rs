@@ -6,12 +6,14 @@ use super::sample::Sample;
 use super::sweep::Swept;
 use crate::engine::constraints::Impacts;
 use crate::engine::params::Budget;
+use crate::engine::solvers::find;
 use crate::engine::world::{Criterion, Divergence, Order, Quantity};
 use crate::lab::interned::{self, Name};
 use crate::lab::metrics::Errors;
-use crate::lab::scenes::Truth;
+use crate::lab::overrides;
 use crate::lab::scenes::holds::{Broken, Mark};
 use crate::lab::scenes::tolerance::{Accuracy, Tolerances};
+pub use crate::lab::trial::TruthError;
 use crate::lab::units::si;
 
 /// One row of the study: a scene, a solver, a budget, an order and a lane width.
@@ -72,7 +74,7 @@ pub struct Record {
     pub failure: Option<FailedAt>,
 }
 
-/// File format: the columns `holds` and `failed_step`.
+/// File format: the columns `holds` and `failed_step`, and the body if there is one.
 mod holding {
     use super::{Broken, Mark};
     use serde::de::Error;
@@ -82,19 +84,22 @@ mod holding {
     struct Words {
         holds: String,
         failed_step: Option<u64>,
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        failed_body: Option<usize>,
     }
 
     pub fn serialize<S: Serializer>(broken: &Option<Broken>, serializer: S) -> Result<S::Ok, S::Error> {
         let holds = broken.map_or("yes", |broken| broken.mark.word()).to_string();
-        Words { holds, failed_step: broken.map(|broken| broken.step) }.serialize(serializer)
+        let (failed_step, failed_body) = (broken.map(|b| b.step), broken.and_then(|b| b.body));
+        Words { holds, failed_step, failed_body }.serialize(serializer)
     }
 
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Broken>, D::Error> {
-        let Words { holds, failed_step } = Words::deserialize(deserializer)?;
+        let Words { holds, failed_step, failed_body } = Words::deserialize(deserializer)?;
         let Some(step) = failed_step else { return Ok(None) };
         let mark = Mark::ALL.into_iter().find(|mark| mark.word() == holds);
         let mark = mark.ok_or_else(|| D::Error::custom(format!("'{holds}' is no word of 'holds'")))?;
-        Ok(Some(Broken { mark, step }))
+        Ok(Some(Broken { mark, step, body: failed_body }))
     }
 }
 
@@ -145,7 +150,50 @@ impl Record {
         self.broken.map(|b| b.mark).or(self.failure.map(|_| Mark::BlewUp))
     }
 
-    /// Whether the run holds. Fronts, slices, profiles and advice include only such settings.
+    /// Step of the first violated requirement or of the divergence; `None` if the run holds.
+    pub fn failed_step(&self) -> Option<u64> {
+        self.broken.map(|b| b.step).or(self.failure.map(|f| f.step))
+    }
+
+    /// The command that runs this setting on `scene`, a name or a file.
+    pub fn command(&self, scene: &str) -> String {
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-.:/".contains(c);
+        let scene = match scene.chars().all(is_plain) && !scene.is_empty() {
+            true => scene.to_string(),
+            false => format!("'{}'", scene.replace('\'', "'\\''")),
+        };
+        let mut text = format!("simpulse run {scene} --solver {}", self.solver);
+        text += &match self.order {
+            Order::Colored => format!(" --lanes {}", self.lanes),
+            order => format!(" --order {}", order.name()),
+        };
+        text += &format!(" --substeps {}", self.budget.substeps);
+        if let Ok(solver) = find(self.solver) {
+            let fields = [
+                ("velocity", self.budget.velocity_iterations, solver.uses.velocity),
+                ("relax", self.budget.relax_iterations, solver.uses.relax),
+                ("position", self.budget.position_iterations, solver.uses.position),
+            ];
+            let used = fields.into_iter().filter(|f| f.2);
+            text += &used.map(|(name, n, _)| format!(" --{name}-iterations {n}")).collect::<String>();
+            let own = overrides::of_words(solver, &self.parameters).unwrap_or_else(|_| solver.defaults());
+            for word in overrides::changed(solver, &own).split_whitespace() {
+                text += &format!(" --set {word}");
+            }
+        }
+        if self.impacts != Impacts::Own {
+            text += &format!(" --impacts {}", self.impacts.name());
+        }
+        text
+    }
+
+    /// The command that draws this setting where it failed.
+    pub fn command_to_see(&self, scene: &str) -> String {
+        let steps = self.failed_step().map_or(String::new(), |step| format!(" --steps {step}"));
+        format!("{}{steps} --picture failed.svg", self.command(scene))
+    }
+
+    /// Whether the run holds. Fronts, profiles and advice include only such settings.
     pub fn holds(&self) -> bool {
         self.mark().is_none()
     }
@@ -185,29 +233,6 @@ impl Record {
         let worst = judged.map(|axis| self.in_tolerance_at(axis, accuracy).unwrap_or(f64::INFINITY));
         let fell = self.later.is_some_and(|later| later.broken.is_some());
         if self.holds() && !fell && !self.is_unsolved() { worst.fold(0.0, f64::max) } else { f64::INFINITY }
-    }
-}
-
-/// Distance of a run from a reference value.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct TruthError {
-    /// Name of the quantity.
-    #[serde(deserialize_with = "interned::read")]
-    pub quantity: Name,
-    /// Unit of both numbers.
-    #[serde(deserialize_with = "interned::read")]
-    pub unit: Name,
-    /// The reference value.
-    pub expected: f64,
-    /// Distance to it; `None` if the run never reached the observed event.
-    pub error: Option<f64>,
-}
-
-impl TruthError {
-    /// Result of the observer; an infinite distance becomes `None`.
-    pub fn of(truth: &Truth) -> Self {
-        let error = truth.observer.error().filter(|e| e.is_finite());
-        TruthError { quantity: truth.quantity, unit: truth.unit, expected: truth.expected, error }
     }
 }
 
@@ -362,7 +387,7 @@ pub(crate) mod tests {
 
     /// A record with errors and a time whose run fell.
     pub fn fell(lanes: usize, substeps: u32, time: f64, penetration: f64) -> Record {
-        let broken = Some(Broken { mark: Mark::Fell, step: 100 });
+        let broken = Some(Broken { mark: Mark::Fell, step: 100, body: None });
         Record { broken, ..record(lanes, substeps, time, penetration) }
     }
 
@@ -396,7 +421,7 @@ pub(crate) mod tests {
             (good(&record), record.fails_later()),
             ([false; 3], Some("moves at 36.0 mm/s after 60 s".into()))
         );
-        let broken = Some(Broken { mark: Mark::Fell, step: 800 });
+        let broken = Some(Broken { mark: Mark::Fell, step: 800, body: None });
         record.later = Some(Later { broken, rest_speed_m_s: Some(0.0), ..later });
         assert_eq!((good(&record), record.fails_later()), ([false; 3], Some("fell at step 800".into())));
     }

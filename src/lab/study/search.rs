@@ -20,9 +20,9 @@
 //! plausible ones are added. If none of the last candidates is plausible, the dropped ones get whole runs as
 //! well, until one is. So no solver fails on a scene because of candidates that only had short runs.
 
-use super::found::{Found, FoundBudgets, TunedBudget};
+use super::found::{FoundBudgets, TunedBudget};
 use super::horizon::{in_parallel, later};
-use super::{ErrorCell, FailedAt, Progress, Record, RecordRow, StudyPlan};
+use super::{ErrorCell, FailedAt, Record, RecordRow, StudyPlan};
 use super::{leave_out_unseen, observe_until_broken, record_of, settings};
 use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
@@ -69,32 +69,33 @@ pub fn rule() -> String {
     )
 }
 
-/// Searches for settings of every solver of the plan on each of its scenes, on all cores.
+/// Searches for settings of every solver of the plan on one of its scenes, on all cores. `tell` receives the
+/// finished share of the work and the name of the next part.
 ///
-/// Errors: as [`StudyPlan::check`].
-pub fn search(plan: &StudyPlan, progress: &(dyn Fn(Progress) + Sync)) -> Result<Found, Error> {
-    plan.check()?;
-    let mut jobs = Vec::new();
-    for name in &plan.scenes {
-        let scene = plan.open(name)?.scene;
-        for &solver in plan.solvers.iter().filter(|solver| scene.runs_on(solver).is_ok()) {
-            jobs.extend(plan.impacts_on(&scene).iter().map(|&impacts| SearchJob {
-                plan,
-                name,
-                solver,
-                impacts,
-            }));
-        }
-    }
-    let (done, total) = (AtomicUsize::new(0), jobs.len());
-    let entries = in_parallel(&jobs, |job| {
-        let what = format!("searching {} · {}", job.name, job.solver.name);
-        progress(Progress { done: done.fetch_add(1, Ordering::Relaxed), total, what });
+/// Errors: a scene that cannot be opened or built.
+pub fn search(
+    plan: &StudyPlan,
+    name: &str,
+    tell: &(dyn Fn(f64, String) + Sync),
+) -> Result<Vec<FoundBudgets>, Error> {
+    let scene = plan.open(name)?.scene;
+    let solvers = plan.solvers.iter().filter(|solver| scene.runs_on(solver).is_ok());
+    let jobs: Vec<SearchJob> = solvers
+        .flat_map(|&solver| plan.impacts_on(&scene).iter().map(move |&impacts| (solver, impacts)))
+        .map(|(solver, impacts)| SearchJob { plan, name, solver, impacts })
+        .collect();
+    let (done, total) = (AtomicUsize::new(0), jobs.len() as f64);
+    in_parallel(&jobs, |job| {
+        let share = done.fetch_add(1, Ordering::Relaxed) as f64 / total;
+        tell(share, format!("searching {name} · {}", job.solver.name));
         let candidates = job.best()?;
-        let scene = plan.open(job.name)?.scene.name;
-        Ok(FoundBudgets { scene, solver: job.solver.name, impacts: job.impacts, candidates })
-    })?;
-    Ok(Found { entries })
+        Ok(FoundBudgets {
+            scene: scene.name.clone(),
+            solver: job.solver.name,
+            impacts: job.impacts,
+            candidates,
+        })
+    })
 }
 
 /// The candidates of a solver in steps of `dt` (s): those with standard parameters first, then the others as
@@ -235,18 +236,9 @@ impl SearchJob<'_> {
         self.plan.open(self.name).is_ok_and(|loaded| loaded.rests())
     }
 
-    fn cell(&self, &TunedBudget { budget, parameters }: &TunedBudget) -> ErrorCell<'_> {
-        let SearchJob { name, solver, impacts, .. } = *self;
-        ErrorCell {
-            scene: [0; 2],
-            swept: None,
-            name,
-            solver,
-            impacts,
-            budget,
-            parameters,
-            widest_alone: false,
-        }
+    fn cell(&self, &tuned: &TunedBudget) -> ErrorCell {
+        let SearchJob { solver, impacts, .. } = *self;
+        ErrorCell { point: 0, swept: None, solver, impacts, tuned, widest_alone: false }
     }
 
     /// All widths of colored order give the same bits. The plan may contain natural order only.
@@ -267,8 +259,7 @@ impl SearchJob<'_> {
         let plan = StudyPlan { steps, ..self.plan.clone() };
         let (order, width) = self.order();
         let (mut records, mut works) = (Vec::new(), Vec::new());
-        let mut loaded = plan.open(self.name)?;
-        loaded.tolerances = loaded.tolerances.with(&plan.tolerances);
+        let loaded = plan.open(self.name)?;
         for candidate in list {
             let cell = self.cell(candidate);
             let given = settings(&plan, &cell, order, width);
@@ -336,7 +327,7 @@ fn by_fronts(points: &[[f64; 2]]) -> Vec<Vec<usize>> {
 mod tests {
     use super::*;
     use crate::engine::solvers::{VARIANTS, find};
-    use crate::lab::study::budget;
+    use crate::lab::study::{budget, found::Found};
 
     #[test]
     fn every_solver_has_the_same_grid_and_no_more_candidates_than_any_other() {
@@ -391,13 +382,14 @@ mod tests {
             solvers: vec![find("pgs").unwrap(), find("jacobi").unwrap()],
             ..StudyPlan::default()
         };
-        let found = search(&plan, &|_| ()).unwrap();
+        let search = || Found { entries: search(&plan, "stack:2", &|_, _| ()).unwrap() };
+        let found = search();
         let pgs = found.of("stack:2", plan.solvers[0], Impacts::Own).unwrap();
         assert_eq!(pgs.len(), 3);
         let work = |c: &TunedBudget| c.budget.substeps * (1 + c.budget.velocity_iterations);
         assert!(pgs.windows(2).all(|w| work(&w[0]) <= work(&w[1])), "{pgs:?}");
         // The same twice, and the same from a file.
-        assert_eq!(search(&plan, &|_| ()).unwrap(), found);
+        assert_eq!(search(), found);
         assert_eq!(Found::of_csv(&String::from_utf8(found.to_csv().unwrap()).unwrap()).unwrap(), found);
         let none = found.of("stack:3", plan.solvers[0], Impacts::Own);
         assert_eq!(none, None);

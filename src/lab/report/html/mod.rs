@@ -202,7 +202,7 @@ fn page(study: &StudyFile, matrix: Option<&VerifyFile>, recordings: &[(Vec<u8>, 
     let cases = match matrix {
         Some(found) => matrix::matrix(found),
         None => "<p>Not run. <code>simpulse verify --json &gt; DIR/verify.json</code> and then \
-                 <code>simpulse report DIR</code> adds it here.</p>\n"
+                 <code>simpulse study --from DIR</code> adds it here.</p>\n"
             .into(),
     };
     section("verify", "Hard cases with known reference values", "", cases);
