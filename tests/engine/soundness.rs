@@ -478,7 +478,9 @@ fn allowing(folder: &Path, found: &mut Vec<String>) {
             allowing(&path, found);
         } else if path.extension().is_some_and(|e| e == "rs") {
             let text = std::fs::read_to_string(&path).expect("a source file");
-            if text.lines().any(|line| line.trim_start().starts_with("#![allow(unsafe_code")) {
+            let names_it =
+                |line: &str| line.split("//").next().is_some_and(|code| code.contains("unsafe_code"));
+            if !path.ends_with(file!()) && text.lines().any(names_it) {
                 found.push(path.strip_prefix(ROOT).expect("below the root").display().to_string());
             }
         }
