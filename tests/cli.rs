@@ -348,7 +348,6 @@ fn every_csv_header_is_documented() {
     };
     run(&["study", "--quick", "--scenes", "stack:2", "--solvers", "pgs", "--lanes", "1", "--out", "o"]);
     run(&["converge", "stack:3", "--step", "20", "--solvers", "pgs", "--repeats", "0", "--out", "o"]);
-    run(&["agree", "--solvers", "pgs", "--out", "o"]);
     run(&["growth", "--contacts", "1e2,3e2", "--settle", "2", "--repeats", "1", "--out", "o"]);
     run(&["run", "stack:2", "--steps", "3", "--state", "o/state.csv", "--contacts", "o/contacts.csv"]);
     run(&["run", "four_bar", "--steps", "3", "--joints", "o/joints.csv"]);
@@ -387,7 +386,7 @@ fn data_is_printed_as_json_where_that_is_asked_for() {
     assert_eq!(cells["results"][0]["passed"], true);
     let converge = ["converge", "stack:3", "--solvers", "pgs", "--repeats", "0", "--json"];
     assert!(json(&converge)["gauss_seidel_rate"].as_f64().unwrap() < 1.0);
-    let frozen = json(&["capture", "stack:3", "--out", "s.frozen", "--json"]);
+    let frozen = json(&["converge", "stack:3", "--freeze", "s.frozen", "--json"]);
     assert!(frozen["certificate"].is_object(), "{frozen}");
     let profile = ["profile", "stack:5", "--seconds", "0.2", "--settle", "3", "--json"];
     assert!(json(&profile)["phases"][0]["limit"].is_string());

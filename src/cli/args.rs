@@ -2,8 +2,6 @@
 
 use super::ablate::AblateArgs;
 use super::advise::AdviseArgs;
-use super::agree::AgreeArgs;
-use super::capture::CaptureArgs;
 use super::compare::CompareArgs;
 use super::converge::ConvergeArgs;
 use super::growth::GrowthArgs;
@@ -67,11 +65,9 @@ pub enum Command {
     Replay(ReplayArgs),
     Report(ReportArgs),
     Advise(AdviseArgs),
-    Capture(CaptureArgs),
     Converge(ConvergeArgs),
     Verify(VerifyArgs),
     Ablate(AblateArgs),
-    Agree(AgreeArgs),
     Torture(TortureArgs),
     Profile(ProfileArgs),
     Growth(GrowthArgs),

@@ -1,18 +1,22 @@
 //! `simpulse converge`: every solver on exactly the same contact problem.
 
-use super::capture::freeze;
-use super::output::{note, print};
+use super::output::{note, print, print_beside, print_json, value};
 use super::progress::Bar;
 use super::values::{self, LaneArgs, SettingArgs, Solvers};
-use crate::lab::converge::{ConvergeOptions, converge_watched, plot, summary, table};
+use crate::lab::capture::capture;
+use crate::lab::converge::{ConvergeOptions, converge_watched, plot, table};
 use crate::lab::error::Error;
 use crate::lab::files;
-use crate::lab::overrides::{self, Override};
+use crate::lab::overrides;
 use crate::lab::picture::axes::with_dark;
+use crate::lab::reference::ContactProblem;
+use crate::lab::reference::certify::{Reference, reference};
 use crate::lab::reference::frozen::Frozen;
 use crate::lab::report::style::Style;
+use crate::lab::study::open_scene;
 use clap::Args;
-use std::path::PathBuf;
+use serde_json::json;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Count the iterations every solver needs on one frozen problem
@@ -22,9 +26,15 @@ use std::process::ExitCode;
 /// otherwise those of its certified reference, each changed by up to 10 %. Solvers with internal state first run 60
 /// steps on the previous step's problem. The output says which solver has no warm curve, and why.
 ///
-/// Prints the iterations, sweeps and times to residuals 1e-1 to 1e-6, the asymptotic rate, and the
-/// distance of the velocities from the certified reference. A dash means that a tolerance was not
-/// reached. Ends with a summary: sweeps per solver, next to the f64 Gauss–Seidel rate.
+/// The problem is that of one step of a scene: masses, velocities, Jacobians, gaps, friction and warm-start
+/// impulses; and the rows of joints with their errors, springs, motors and bounds. Values stored in f32 are taken
+/// exactly. --freeze writes it to a file, with a reference solution if one can be found and certified. With --freeze,
+/// --solver, its budget, --set, --impacts and --without say how the steps before are solved; without it, --set
+/// applies to the compared solvers.
+///
+/// Prints the sweeps per solver to 1e-2 and 1e-4, next to the f64 Gauss–Seidel rate; then iterations to
+/// residuals 1e-1 to 1e-6, the asymptotic rate, the distance of the velocities from the certified reference, and
+/// the time of an iteration. A dash means that a tolerance was not reached.
 ///
 /// The residual is measured against two laws: the rigid contact law, which is the same for all, and
 /// the law that the solver itself set out to solve (soft contacts, position feedback, no friction).
@@ -38,15 +48,25 @@ Examples:
       A column of ten discs: the rate of Gauss-Seidel is cos²(π/20) = 0.9755.
   simpulse converge pyramid:10 --step 120 --solvers pgs,soft_step
       Freezes the step itself; only two solvers.
+  simpulse converge pyramid:10 --step 120 --freeze pyramid.frozen
+      Writes the problem of a pyramid that has come to rest after two seconds.
+  simpulse converge my_scene.json --step 30 --freeze impact.frozen --solver pgs --velocity-iterations 50
+      The same, but with the steps before it solved more accurately.
   simpulse converge pyramid.frozen --repeats 0 --out results
       No timing, so that the output is the same on every run.")]
 pub struct ConvergeArgs {
-    /// Frozen problem (a file, not ending in .json), or a scene as for `simpulse capture`
+    /// Frozen problem (a file, not ending in .json), or a scene as for `simpulse run`
     #[arg(value_name = "FILE|SCENE", value_parser = values::scene())]
     pub problem: String,
-    /// Step to freeze if a scene is given, counted from 1
+    /// Step to freeze if a scene is given, from 1; the steps before it are run
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..))]
     pub step: u64,
+    /// Write the frozen problem of a scene to this file and run no solver on it
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["solvers", "max_iterations", "lanes", "seed", "repeats", "out"])]
+    pub freeze: Option<PathBuf>,
+    /// How the steps before are solved
+    #[command(flatten)]
+    pub setting: SettingArgs,
     /// Solvers
     #[command(flatten)]
     pub solvers: Solvers,
@@ -56,9 +76,6 @@ pub struct ConvergeArgs {
     /// Lanes in colored order
     #[command(flatten)]
     pub lanes: LaneArgs,
-    /// Solver parameters, such as `contact_hertz=60` (`simpulse solvers` lists them)
-    #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
-    pub set: Vec<Override>,
     /// Seed of the shuffled order
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -68,44 +85,83 @@ pub struct ConvergeArgs {
     /// Folder for converge.csv, converge.json and converge.svg
     #[arg(long, value_name = "FOLDER", default_value = "results")]
     pub out: PathBuf,
-    /// Print JSON instead of text: what converge.json holds
+    /// Print JSON instead of text: what converge.json holds, or what --freeze found
     #[arg(long)]
     pub json: bool,
 }
 
-impl ConvergeArgs {
-    fn options(&self) -> Result<ConvergeOptions, Error> {
-        let solvers = self.solvers.chosen();
-        overrides::check(&solvers, &self.set)?;
-        note(&overrides::partly(&solvers, &self.set));
-        Ok(ConvergeOptions {
-            solvers,
-            max_iterations: self.max_iterations,
-            seed: self.seed,
-            width: self.lanes.or_native(),
-            overrides: self.set.clone(),
-            rounds: self.repeats,
-            baseline: true,
-        })
+/// The problem of a step, with its reference solution; if there is none, the reason why.
+///
+/// Errors: an unknown scene, an invalid scene file or setting, a run that diverges before the step, a step
+/// without contacts and joints.
+fn frozen_step(name: &str, step: u64, setting: &SettingArgs) -> Result<(Frozen, Option<String>), Error> {
+    let mut world = open_scene(name, None, None, None)?.scene.build(setting.settings()?)?;
+    let bar = Bar::new();
+    for done in 1..step {
+        bar.step(done as usize, step as usize, "steps before");
+        world.step().map_err(|divergence| Error::invalid("--step", divergence.to_string()))?;
+    }
+    let problem = capture(&mut world, format!("{name}, step {step}"));
+    if problem.unknowns() == 0 {
+        let message = format!("step {step} of '{name}' has no contacts and no joints");
+        return Err(Error::invalid("--step", message));
+    }
+    bar.show(0, 1, format!("looking for a reference of {}", sizes(&problem)));
+    Ok(match reference(&problem) {
+        Ok(reference) => (Frozen { problem, reference: Some(reference) }, None),
+        Err(why) => (Frozen { problem, reference: None }, Some(why.to_string())),
+    })
+}
+
+/// Numbers of contact points and, if there are any, of joint rows.
+fn sizes(problem: &ContactProblem) -> String {
+    let points = format!("{} contact points", problem.contacts.len());
+    match problem.joint_rows() {
+        0 => points,
+        rows => format!("{points}, {rows} rows of {} joints", problem.joints.len()),
     }
 }
 
 /// Runs the command.
 pub fn run(args: &ConvergeArgs) -> Result<ExitCode, Error> {
-    let options = args.options()?;
     let path = files::path_of(&args.problem);
     let is_frozen = args.problem.ends_with(".frozen") || path.is_file() && !args.problem.ends_with(".json");
+    if let Some(file) = &args.freeze {
+        if is_frozen {
+            return Err(Error::invalid(
+                "--freeze",
+                format!("'{}' is a frozen problem already", args.problem),
+            ));
+        }
+        return freeze(args, file);
+    }
+    let standard = SettingArgs::standard()?;
+    let before = SettingArgs { set: Vec::new(), ..args.setting.clone() }.settings()?;
+    if format!("{before:?}") != format!("{:?}", standard.settings()?) {
+        let message = "the setting of the steps before; give --freeze FILE, then converge FILE";
+        return Err(Error::invalid("--solver, --substeps, --…-iterations, --impacts, --without", message));
+    }
+    let (solvers, set) = (args.solvers.chosen(), &args.setting.set);
+    overrides::check(&solvers, set)?;
+    note(&overrides::partly(&solvers, set));
     let frozen = if is_frozen {
         Frozen::read(&path)?
     } else {
-        let (frozen, why_not) = freeze(&args.problem, args.step, &SettingArgs::standard()?)?;
-        if let Some(why) = why_not {
-            note(&format!("{why}\n"));
-        }
+        let (frozen, why_not) = frozen_step(&args.problem, args.step, &standard)?;
+        why_not.iter().for_each(|why| note(&format!("{why}\n")));
         frozen
     };
     // Fail before the long computation, not after it.
     files::prepare_folder(&args.out)?;
+    let options = ConvergeOptions {
+        solvers,
+        max_iterations: args.max_iterations,
+        seed: args.seed,
+        width: args.lanes.or_native(),
+        overrides: set.clone(),
+        rounds: args.repeats,
+        baseline: true,
+    };
     let bar = Bar::new();
     let tell = |done: usize, parts: usize, what: &str| bar.show(done, parts, what);
     let report = converge_watched(&frozen.problem, frozen.reference.as_ref(), &options, &tell)?;
@@ -123,6 +179,34 @@ pub fn run(args: &ConvergeArgs) -> Result<ExitCode, Error> {
         return print(&json);
     }
     let names = files.map(|f| f.0).join(", ");
-    let text = table::text(&report) + "\n" + &summary::text(&report) + &values::left_out(&options.solvers);
+    let text = table::text(&report) + &values::left_out(&options.solvers);
     print(&format!("{text}wrote {names} in {}\n", args.out.display()))
+}
+
+fn freeze(args: &ConvergeArgs, file: &Path) -> Result<ExitCode, Error> {
+    let (frozen, why_not) = frozen_step(&args.problem, args.step, &args.setting)?;
+    frozen.write(file)?;
+    let Frozen { problem, reference } = &frozen;
+    if args.json {
+        let certificate = reference.as_ref().map(|r| value(&r.certificate)).transpose()?;
+        return print_json(&json!({
+            "problem": problem.name,
+            "bodies": problem.bodies.len(),
+            "contact_points": problem.contacts.len(),
+            "joints": problem.joints.len(),
+            "joint_rows": problem.joint_rows(),
+            "file": file.display().to_string(),
+            "certificate": certificate,
+            "no_reference_because": why_not,
+        }));
+    }
+    let found = match (reference, why_not) {
+        (Some(Reference { certificate: c, .. }), _) => {
+            format!("reference: {}, natural-map residual {:.1e}", c.method, c.natural_map)
+        }
+        (None, why) => format!("written without a reference: {}", why.unwrap_or_default()),
+    };
+    let (name, bodies, sizes) = (&problem.name, problem.bodies.len(), sizes(problem));
+    let text = format!("{name}: {bodies} bodies, {sizes}, written to {}\n{found}\n", file.display());
+    print_beside([file], &text)
 }

@@ -5,9 +5,7 @@
 
 pub mod ablate;
 pub mod advise;
-pub mod agree;
 pub mod args;
-pub mod capture;
 pub mod compare;
 pub mod converge;
 pub mod growth;
@@ -105,11 +103,9 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::Report(args)) => report::run(&args),
         Some(Command::Advise(args)) => advise::run(&args),
-        Some(Command::Capture(args)) => capture::run(&args),
         Some(Command::Converge(args)) => converge::run(&args),
         Some(Command::Verify(args)) => verify::run(&args),
         Some(Command::Ablate(args)) => ablate::run(&args),
-        Some(Command::Agree(args)) => agree::run(&args),
         Some(Command::Torture(args)) => torture::run(&args),
         Some(Command::Profile(args)) => profile::run(&args),
         Some(Command::Growth(args)) => growth::run(&args),

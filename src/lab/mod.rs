@@ -95,14 +95,12 @@
 //! study  converge  verify        solver × scene × budget; iterations to a tolerance; hard cases
 //! advise  report                 the cheapest setting; tables, plots, records
 //! profile  compare               phases against the roofline, cost by size; two studies side by side
-//! agree                          every solver against its source's method in f64
 //! ablate                         what each mechanism of a solver is for
 //! torture                        scenes at random, and what no solver may do in them
 //! ```
 
 pub mod ablate;
 pub mod advise;
-pub mod agree;
 pub mod capture;
 pub mod compare;
 pub mod converge;

@@ -87,7 +87,7 @@ const LAB: &[&[&str]] = &[
     &["recording"],
     &["verify", "study", "converge"],
     &["advise", "report"],
-    &["ablate", "agree", "profile", "compare", "torture"],
+    &["ablate", "profile", "compare", "torture"],
 ];
 
 const CONSTRAINTS: &[&[&str]] =

@@ -1,15 +1,12 @@
 //! The frozen problems in `tests/frozen`: their stored solutions are valid, and every family of methods finds
 //! them again.
 
+use simpulse::lab::reference::Target;
 use simpulse::lab::reference::certify::{AGREED, CERTIFIED, certify, reference};
 use simpulse::lab::reference::frozen::Frozen;
 use simpulse::lab::reference::gallery;
-use simpulse::lab::reference::newton::newton;
-use simpulse::lab::reference::nncg::nncg;
-use simpulse::lab::reference::residual::Target;
+use simpulse::lab::reference::iterate::{Iteration, Stop, iterate};
 use simpulse::lab::reference::stewart_trinkle::stewart_trinkle;
-use simpulse::lab::reference::sweeps::{Stop, SweepDirection, pgs};
-use simpulse::lab::reference::{ContactProblem, DPair};
 use std::path::PathBuf;
 
 fn path(name: &str) -> PathBuf {
@@ -57,23 +54,18 @@ fn stored_solutions_keep_their_certificates() {
 
 #[test]
 fn every_family_reproduces_the_stored_velocities() {
-    type Method = fn(&ContactProblem) -> Vec<DPair>;
-    fn cold(p: &ContactProblem) -> Vec<DPair> {
-        p.no_impulses()
-    }
-    const fn stop(iterations: usize) -> Stop {
-        Stop { tolerance: 1e-12, iterations }
-    }
-    let methods: [(&str, Method); 4] = [
-        ("Lemke", |p| stewart_trinkle(p, Target::Rigid).unwrap()),
-        ("PGS", |p| pgs(p, Target::Rigid, &cold(p), SweepDirection::Symmetric, stop(20_000)).impulses),
-        ("NNCG", |p| nncg(p, Target::Rigid, &cold(p), stop(2_000)).impulses),
-        ("Newton", |p| newton(p, Target::Rigid, &cold(p), stop(60)).impulses),
-    ];
     for Frozen { problem, reference } in library() {
         let reference = reference.unwrap();
-        for (name, solve) in methods {
-            let impulses = solve(&problem);
+        let by = |method| {
+            let stop = Stop { tolerance: 1e-12, iterations: 20_000 };
+            iterate(&problem, Target::Rigid, &problem.no_impulses(), method, stop).impulses
+        };
+        for (name, impulses) in [
+            ("Lemke", stewart_trinkle(&problem, Target::Rigid).unwrap()),
+            ("PGS", by(Iteration::Symmetric)),
+            ("NNCG", by(Iteration::Conjugate)),
+            ("Anderson", by(Iteration::Anderson(20))),
+        ] {
             let distance = reference.compare(&problem, &problem.velocities(&impulses), &impulses);
             assert!(
                 distance.velocity <= AGREED && distance.body_impulse <= AGREED,

@@ -8,10 +8,7 @@
 //! as in the source. Sums are formed color by color, so that every width gives the same bits. A factor
 //! `relaxation` on all increments is added; 1 is the source's solver.
 //!
-//! **Agreement.** The source at its best: 4 soft sweeps and 2 relaxing ones, 30 Hz, ζ 10, 4 m/s. Here: 4
-//! iterations, 2 relaxing sweeps, contact_hertz 30, relaxation 1, push_speed 4. Apart from the source's
-//! method in `f64` over 10 iterations by less than 6e-5: `cargo test --release --test lab agree`. Departures,
-//! and how far each moves the result: the push cap is on γ_m β s (source: on β s): 10 %.
+//! **Agreement.** Within 6e-5 of its source's method in `f64` (`tests/lab/agree`).
 //!
 //! **Cost.** Per substep 2 body passes and 1 warm start; `velocity_iterations` soft sweeps and, after
 //! the positions, `relax_iterations` rigid ones. A sweep gathers each body twice, as it reads old

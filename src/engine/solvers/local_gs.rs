@@ -10,10 +10,7 @@
 //! **Departures.** A whole color is swept several times in a row. The result is the same, because the
 //! contacts of a color share no movable body.
 //!
-//! **Agreement.** The source at its best: local solver exact, until a residual is reached. Here: 4
-//! iterations, baumgarte 0.3, local_iterations 2. Apart from the source's method in `f64` over 10 iterations
-//! by less than 6e-5: `cargo test --release --test lab agree`. Departures, and how far each moves the result:
-//! 2 local iterations (source: until the contact is solved): 10 %.
+//! **Agreement.** Within 6e-5 of its source's method in `f64` (`tests/lab/agree`).
 //!
 //! **Cost.** That of [`super::pgs`] with `velocity_iterations` × `local_iterations` sweeps. Sweeps of a step
 //! request 1750 B per contact.

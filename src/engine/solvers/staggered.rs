@@ -9,9 +9,7 @@
 //! method. In 2D a friction cone is an interval and needs no facets. Overlap is pushed apart as in
 //! [`super::pgs`]. Joint rows are in both programs, with their bounds.
 //!
-//! **Agreement.** The source at its best: until the change of a round is small. Here: 4 iterations, baumgarte
-//! 0.3, inner 10. Apart from the solution in `f64` after 2000 iterations by less than 6e-5 (its rounds end at
-//! the solution of `pgs`): `cargo test --release --test lab agree`.
+//! **Agreement.** Within 6e-5 of the solution in `f64` (`tests/lab/agree`).
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and in each of `velocity_iterations` rounds up to 2 `inner` times 3 passes
 //! over vectors in lanes. Sweeps of a step request 44059 B per contact.

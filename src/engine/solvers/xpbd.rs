@@ -9,10 +9,7 @@
 //! start of the step. Springs and motors of joints are velocity rows, solved once per substep before bodies
 //! move, instead of compliances.
 //!
-//! **Agreement.** The source at its best: 4 to 20 substeps of 1 iteration, no compliance, 4 m/s. Here: 4
-//! substeps of 1 position sweep, push_speed 4, compliance 0. Apart from the source's method in `f64` over 10
-//! substeps by less than 6e-5: `cargo test --release --test lab agree`. Departures, and how far each moves
-//! the result: velocities are corrected on arms of the start of the step (source: turned): 3 %.
+//! **Agreement.** Within 6e-5 of its source's method in `f64` (`tests/lab/agree`).
 //!
 //! **Cost.** Per substep 4 body passes, `position_iterations` displacing sweeps, which gather bodies
 //! twice, and 1 velocity sweep. Sweeps of a step request 1873 B per contact.

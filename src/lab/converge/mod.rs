@@ -24,12 +24,8 @@
 pub mod plot;
 pub mod replay;
 mod rows;
-mod scalar;
 mod setup;
-#[doc(hidden)]
-pub mod summary;
 pub mod table;
-pub mod timing;
 pub mod warm;
 
 use crate::engine::lanes::{LaneWidth, native_width};
@@ -37,16 +33,14 @@ use crate::engine::params::Budget;
 use crate::engine::solvers::{VARIANTS, Variant};
 use crate::lab::error::Error;
 use crate::lab::overrides::{self, Override};
-use crate::lab::reference::ContactProblem;
-use crate::lab::reference::baseline::gauss_seidel_rate;
 use crate::lab::reference::certify::{Certificate, Reference};
-use crate::lab::reference::rates;
-use crate::lab::reference::residual::{Summary, Target, contact_residuals, joint_residuals, natural_map};
+use crate::lab::reference::iterate::{Iteration, Stop, gauss_seidel_rate, iterate, rate_at};
+use crate::lab::reference::residual::{contact_residuals, joint_residuals, largest, natural_map};
+use crate::lab::reference::{ContactProblem, Target};
 use replay::{Replay, Replayed, Sequence, Start};
 use serde::Serialize;
 use std::cell::Cell;
 use std::collections::BTreeMap;
-use timing::IterationTime;
 use warm::{WarmStartSource, Warmed};
 
 /// Residuals for which the first iteration that reaches them is reported (1).
@@ -138,6 +132,16 @@ pub struct ReplayCurve {
     pub own_is_rigid: bool,
     /// Time of an iteration; `None` if not measured.
     pub iteration: Option<IterationTime>,
+}
+
+/// Time of an iteration (ns), without set-up, over identical rounds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct IterationTime {
+    /// Median over the rounds.
+    pub median_ns: f64,
+    /// Quartiles over the rounds. There is no mean: each round is a difference of two runs, and interruptions
+    /// would dominate it.
+    pub quartiles_ns: [f64; 2],
 }
 
 /// All curves of one problem.
@@ -271,9 +275,20 @@ pub fn converge_watched(
     }
     if options.rounds > 0 {
         tell(parts - 2, parts, "times");
-        let mut cases: Vec<_> = timers.iter_mut().map(|(schedule, replay, _)| (*schedule, replay)).collect();
-        let times = timing::time(&mut cases, options.rounds);
-        for (time, (_, _, range)) in times.into_iter().zip(&timers) {
+        // Every round times every solver once, so a slow spell of the machine affects all alike.
+        let ranges: Vec<TimedRange> =
+            timers.iter_mut().map(|(s, replay, _)| TimedRange::of(s, replay)).collect();
+        let mut samples = vec![Vec::new(); timers.len()];
+        for _ in 0..options.rounds {
+            for (((schedule, replay, _), range), samples) in timers.iter_mut().zip(&ranges).zip(&mut samples)
+            {
+                samples.push(range.time(schedule, replay));
+            }
+        }
+        for (mut s, (_, _, range)) in samples.into_iter().zip(&timers) {
+            s.sort_by(f64::total_cmp);
+            let quartiles_ns = [s[s.len() / 4], s[3 * s.len() / 4]];
+            let time = IterationTime { median_ns: s[s.len() / 2], quartiles_ns };
             curves[range.clone()].iter_mut().for_each(|curve| curve.iteration = Some(time));
         }
     }
@@ -282,7 +297,7 @@ pub fn converge_watched(
     let names = schedules.iter().filter(|s| origin != WarmStartSource::None && !has_warm(&s.name));
     let forgetful = names.map(|s| s.name.clone()).collect();
     tell(parts - 1, parts, "methods in f64");
-    curves.extend(scalar::curves(problem, reference, origin != WarmStartSource::None, options));
+    curves.extend(sweeps_in_f64(problem, reference, origin != WarmStartSource::None, options));
     Ok(ConvergeReport {
         problem: problem.name.clone(),
         bodies: problem.bodies.len(),
@@ -320,9 +335,8 @@ fn measure(
     let own = outcome.own.as_ref().map(|own| {
         let target = Target::Own(&own.rows);
         let contacts = contact_residuals(problem, target, velocities, impulses);
-        let contacts = contacts.iter().flat_map(|r| [r.normal, if own.friction { r.tangent } else { 0.0 }]);
-        let parts: Vec<f64> =
-            contacts.chain(joint_residuals(problem, target, velocities, impulses)).collect();
+        let contacts = contacts.iter().flat_map(|r| [r[0], if own.friction { r[1] } else { 0.0 }]);
+        let parts = contacts.chain(joint_residuals(problem, target, velocities, impulses));
         let has_friction = problem.contacts.iter().any(|c| c.friction > 0.0);
         own_is_rigid = own.friction || !has_friction;
         let contacts = (0..problem.contacts.len()).map(|i| Target::Rigid.row(problem, i));
@@ -331,7 +345,7 @@ fn measure(
             let rounding = 1e-6 * (1.0 + rigid.bias.abs());
             own_is_rigid &= (row.bias - rigid.bias).abs() <= rounding && row.compliance == 0.0;
         }
-        Summary::of(&parts).max / unit
+        largest(parts) / unit
     });
     let velocity_error = reference.map(|r| r.compare(problem, velocities, impulses).velocity);
     (CurvePoint { iterations, sweeps: outcome.sweeps, rigid, own, velocity_error }, own_is_rigid)
@@ -404,6 +418,61 @@ fn curve(
     }
 }
 
+/// Curves of sweeps in `f64`, which share no code with the solvers. They solve a contact row by row, so with
+/// friction the order of rows differs slightly from the solvers' order.
+fn sweeps_in_f64(
+    problem: &ContactProblem,
+    reference: Option<&Reference>,
+    has_warm_start: bool,
+    options: &ConvergeOptions,
+) -> Vec<ReplayCurve> {
+    let stop = Stop { tolerance: 1e-9, iterations: options.max_iterations as usize };
+    let mut shuffled = problem.clone();
+    let order = Sequence::Shuffled(options.seed);
+    let manifolds: Vec<_> = problem.contacts.chunk_by(|p, q| p.manifold == q.manifold).collect();
+    shuffled.contacts =
+        order.order(manifolds.len()).iter().flat_map(|&i| manifolds[i as usize].iter().copied()).collect();
+    shuffled.joints =
+        order.order(problem.joints.len()).iter().map(|&i| problem.joints[i as usize].clone()).collect();
+    let methods = [
+        ("Gauss-Seidel", problem, Sequence::Natural, Iteration::Forward),
+        ("Gauss-Seidel", &shuffled, order, Iteration::Forward),
+        ("Jacobi", problem, Sequence::Natural, Iteration::Jacobi),
+        ("Jacobi, mass splitting", problem, Sequence::Natural, Iteration::SplitJacobi),
+        ("NNCG", problem, Sequence::Natural, Iteration::Conjugate),
+    ];
+    let mut curves = Vec::new();
+    for (name, problem, order, method) in methods {
+        for start in [Start::Cold, Start::Warm].into_iter().take(if has_warm_start { 2 } else { 1 }) {
+            let impulses = if start == Start::Warm { problem.warm_impulses() } else { problem.no_impulses() };
+            let run = iterate(problem, Target::Rigid, &impulses, method, stop);
+            let error = reference.map(|r| problem.velocity_error(&run.velocities, &r.velocities));
+            let point = |(k, &residual): (usize, &f64)| CurvePoint {
+                iterations: k as u32,
+                sweeps: k,
+                rigid: residual,
+                own: Some(residual),
+                velocity_error: error.filter(|_| k + 1 == run.history.len()),
+            };
+            let points: Vec<CurvePoint> = run.history.iter().enumerate().map(point).collect();
+            let [rigid, own] = LAWS.map(|law| reached(&points, law, 0.0));
+            curves.push(ReplayCurve {
+                solver: name.into(),
+                is_part: false,
+                arithmetic: "f64",
+                order,
+                start,
+                points,
+                rigid,
+                own,
+                own_is_rigid: true,
+                iteration: None,
+            });
+        }
+    }
+    curves
+}
+
 const LAWS: [fn(&CurvePoint) -> Option<f64>; 2] = [|p| Some(p.rigid), |p| p.own];
 
 /// Fits end at this many times the rounding floor, where residuals are off by 1 %.
@@ -418,5 +487,49 @@ fn reached(points: &[CurvePoint], law: fn(&CurvePoint) -> Option<f64>, floor: f6
     let smallest = residuals.iter().filter(|p| p[0] > 0.0).map(|p| p[1]).fold(f64::INFINITY, f64::min);
     let usable = residuals.iter().position(|p| p[1] <= ABOVE_FLOOR * floor).unwrap_or(residuals.len());
     let iterations = first.map(|at| at.map(|at| points[at].iterations));
-    Reached { first, iterations, smallest, rate: rates::rate_at(&residuals[..usable]) }
+    Reached { first, iterations, smallest, rate: rate_at(&residuals[..usable]) }
+}
+
+/// Shortest time difference that is measured (ns), far above the clock's resolution.
+const TIMED_NS: f64 = 50_000.0;
+
+/// Iterations that are timed: the difference of two steps with few and with many iterations ÷ the difference
+/// of their numbers, so set-up is not counted.
+struct TimedRange {
+    few: u32,
+    more: u32,
+    /// Number of repetitions.
+    times: u32,
+}
+
+impl TimedRange {
+    /// A solver that has reached its final state may have nothing left to do. If more iterations change no
+    /// bit, the iterations up to that state are timed repeatedly instead.
+    fn of(schedule: &IteratedSchedule, replay: &mut Replay) -> Self {
+        const FEW: u32 = 4;
+        const MOST: f64 = 4096.0;
+        let mut outcome = |k: u32| {
+            let outcome = replay.run(schedule.variant, schedule.budget(k), Start::Cold);
+            (outcome.velocities, outcome.impulses)
+        };
+        let answer = outcome(FEW);
+        let mut range = TimedRange { few: FEW, more: 64, times: 1 };
+        if answer == outcome(FEW + range.more) {
+            let last = (0..FEW).find(|&k| outcome(k) == answer).unwrap_or(FEW);
+            range = TimedRange { few: 0, more: last.max(1), times: 64 };
+            let estimate = range.time(schedule, replay).max(1.0);
+            range.times = (TIMED_NS / (estimate * f64::from(range.more))).clamp(1.0, MOST) as u32;
+        } else {
+            let estimate = range.time(schedule, replay).max(1.0);
+            range.more = (TIMED_NS / estimate).clamp(8.0, MOST) as u32;
+        }
+        range
+    }
+
+    /// Time of an iteration (ns).
+    fn time(&self, schedule: &IteratedSchedule, replay: &mut Replay) -> f64 {
+        let mut run = |k| replay.time(schedule.variant, schedule.budget(k), Start::Cold).as_nanos() as f64;
+        let sum: f64 = (0..self.times).map(|_| run(self.few + self.more) - run(self.few)).sum();
+        sum / f64::from(self.times) / f64::from(self.more)
+    }
 }

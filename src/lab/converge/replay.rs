@@ -22,7 +22,7 @@ use crate::engine::narrowphase::lanes::PoseRow;
 use crate::engine::params::{Budget, Parameters, Without};
 use crate::engine::solvers::{self, Variant};
 use crate::lab::error::Error;
-use crate::lab::reference::residual::OwnRow;
+use crate::lab::reference::rows::OwnRow;
 use crate::lab::reference::{
     BlockLaw, ContactProblem, DPair, ProblemBlock, ProblemContact, ProblemJoint, ProblemRow, Velocity,
 };

@@ -1,57 +1,116 @@
-//! A [`ConvergeReport`] as tables, CSV and JSON.
+//! A [`ConvergeReport`] as text, CSV and JSON.
 
+use super::replay::{Sequence, Start};
 use super::warm::{OFF, WarmStartSource};
 use super::{ConvergeReport, CurvePoint, Reached, ReplayCurve, TOLERANCES};
 use crate::lab::error::Error;
+use crate::lab::reference::certify::Uniqueness;
+use crate::lab::units::{is_emulated, si};
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 
 /// Shown for a tolerance that is not reached.
 const NEVER: &str = "—";
+/// Indices in [`TOLERANCES`] of the two tolerances in the answer.
+const TOLD: [usize; 2] = [1, 3];
+/// Maximum number of rows of the table; the CSV has all.
+const MOST_ROWS: usize = 20;
 
-/// Human-readable tables: iterations to each tolerance and, if measured, times.
+/// The answer in sentences: sweeps that each solver needs to 1e-2 and to 1e-4, cold and warm, next to the
+/// rate of Gauss–Seidel. Then a table of iterations to each tolerance.
 pub fn text(report: &ConvergeReport) -> String {
-    let mut out = format!(
-        "{}: {} bodies, {} contact points{}; residuals in units of {:.4e} N·s\n{}\n",
+    let joints =
+        if report.joint_rows > 0 { format!(", {} rows of joints", report.joint_rows) } else { String::new() };
+    format!(
+        "{}: {} bodies, {} contact points{joints}; residuals in units of {:.4e} N·s\n{}\n{}\n{}\n{}",
         report.problem,
         report.bodies,
         report.contacts,
-        if report.joint_rows > 0 { format!(", {} rows of joints", report.joint_rows) } else { String::new() },
         report.impulse_unit,
-        reference_line(report)
-    );
-    out += &starts(report);
-    out += "\nIterations to a residual (iterations/sweeps where they differ), by law:\n";
-    let mut table = table(&["rate", "smallest", "v error"]);
-    let each = || report.curves.iter().flat_map(laws);
-    for (curve, law, reached) in each() {
-        let mut row = head(curve, law);
-        row.extend(reached.first.map(|i| i.map_or(NEVER.into(), |i| count(&curve.points[i]))));
-        row.push(reached.rate.map_or(NEVER.into(), |r| format!("{r:.4}")));
-        row.push(format!("{:.1e}", reached.smallest));
-        let error = curve.points.last().and_then(|p| p.velocity_error);
-        row.push(error.map_or(NEVER.into(), |e| format!("{e:.1e}")));
-        table.add_row(row);
-    }
-    align(&mut table);
-    out += &format!("{table}\n");
-    if report.curves.iter().any(|c| c.iteration.is_some()) {
-        out +=
-            "\nTime to a residual, set-up excluded; an iteration: median over the rounds, and quartiles:\n";
-        let mut table = self::table(&["per iteration", "quartiles"]);
-        for (curve, law, reached) in each() {
-            let Some(each) = curve.iteration else { continue };
-            let mut row = head(curve, law);
-            let time = |i: usize| duration(each.median_ns * f64::from(curve.points[i].iterations));
-            row.extend(reached.first.map(|i| i.map_or(NEVER.into(), time)));
-            let [low, high] = each.quartiles_ns.map(duration);
-            row.extend([duration(each.median_ns), format!("{low} to {high}")]);
-            table.add_row(row);
+        reference_line(report),
+        answer(report),
+        starts(report),
+        rows(report)
+    )
+}
+
+fn reference_line(report: &ConvergeReport) -> String {
+    let Some(c) = &report.certificate else { return "Reference: none, so no velocity errors".into() };
+    let unique = match c.uniqueness {
+        Uniqueness::Proven => "unique (no friction)",
+        Uniqueness::Agreed => "agreed on by two methods",
+        Uniqueness::Multiple => "NOT unique: use the residual instead of their error",
+        Uniqueness::Unknown => "found by one method only",
+    };
+    format!("Reference: {}, natural-map residual {:.1e}, velocities {unique}", c.method, c.natural_map)
+}
+
+/// Whole schedules in colored order.
+fn answer(report: &ConvergeReport) -> String {
+    let is_whole = |c: &&ReplayCurve| c.arithmetic == "f32" && c.order == Sequence::Colored && !c.is_part;
+    let whole: Vec<&ReplayCurve> = report.curves.iter().filter(is_whole).collect();
+    let emulated = if is_emulated(report.lanes) { ", emulated" } else { "" };
+    let mut text =
+        format!("In colored order ({} lanes{emulated}), against the rigid contact law:\n", report.lanes);
+    for (at, start) in TOLD.into_iter().flat_map(|at| [(at, Start::Cold), (at, Start::Warm)]) {
+        let own: Vec<_> =
+            whole.iter().filter(|c| c.start == start).map(|c| (&c.solver, to(c, &c.rigid, at))).collect();
+        if own.is_empty() {
+            continue;
         }
-        align(&mut table);
-        out += &format!("{table}\n");
+        let mut reached: Vec<_> = own.iter().filter_map(|(name, n)| n.map(|n| (n, name))).collect();
+        reached.sort();
+        let each: Vec<String> = reached.iter().map(|(n, name)| format!("{name} {n}")).collect();
+        let never: Vec<&str> =
+            own.iter().filter(|(_, n)| n.is_none()).map(|(name, _)| name.as_str()).collect();
+        text += &format!("Sweeps to {:.0e}, {start}: ", TOLERANCES[at]);
+        text += &match (each.is_empty(), never.is_empty()) {
+            (true, _) => "no solver reaches it".into(),
+            (false, true) => each.join(", "),
+            (false, false) => format!("{}; never {}", each.join(", "), never.join(", ")),
+        };
+        text += ".\n";
     }
-    out
+    let changed: Vec<String> = (whole.iter().filter(|c| !c.own_is_rigid && c.start == Start::Cold))
+        .map(|c| {
+            let sweeps = TOLD.map(|at| {
+                let n = to(c, &c.own, at).map_or("none".into(), |n| n.to_string());
+                format!("{n} to {:.0e}", TOLERANCES[at])
+            });
+            format!("{} {}", c.solver, sweeps.join(", "))
+        })
+        .collect();
+    if !changed.is_empty() {
+        let list = changed.join("; ");
+        text += &format!("Sweeps to a solver's own law, if it differs from the rigid law, cold: {list}.\n");
+    }
+    text + &baseline(report, &whole)
+}
+
+/// Sweeps to a tolerance.
+fn to(curve: &ReplayCurve, law: &Reached, at: usize) -> Option<usize> {
+    law.first[at].map(|i| curve.points[i].sweeps)
+}
+
+/// Measured rates, compared with that of Gauss–Seidel.
+fn baseline(report: &ConvergeReport, curves: &[&ReplayCurve]) -> String {
+    let Some(rate) = report.gauss_seidel_rate else {
+        return "Gauss–Seidel in f64 has no rate here: it never converges, or at once.\n".into();
+    };
+    let sweeps = |tolerance: f64| (tolerance.ln() / rate.ln()).ceil();
+    let mut text = format!(
+        "Gauss–Seidel in f64, in the problem's order and from zero, has an asymptotic rate of {rate:.4} per sweep"
+    );
+    if rate < 1.0 {
+        text += &format!(", {:.0} sweeps to 1e-2 and {:.0} to 1e-4", sweeps(1e-2), sweeps(1e-4));
+    }
+    let is_rigid = |c: &&&ReplayCurve| c.start == Start::Cold && c.own_is_rigid;
+    let measured =
+        curves.iter().filter(is_rigid).filter_map(|c| Some(format!("{} {:.4}", c.solver, c.rigid.rate?)));
+    match measured.collect::<Vec<_>>().as_slice() {
+        [] => text + ".\n",
+        list => format!("{text}; measured per iteration: {}.\n", list.join(", ")),
+    }
 }
 
 /// Where warm starts come from, and which curves are missing.
@@ -72,89 +131,73 @@ fn starts(report: &ConvergeReport) -> String {
     if !report.forgetful.is_empty() {
         text += &format!("No warm curve (no warm starting): {}.\n", report.forgetful.join(", "));
     }
-    let mut unobserved: Vec<&str> = Vec::new();
-    for curve in &report.curves {
-        let is_new = !unobserved.contains(&curve.solver.as_str());
-        if is_new && curve.points.iter().all(|p| p.own.is_none()) {
-            unobserved.push(&curve.solver);
-        }
-    }
-    if !unobserved.is_empty() {
+    let unobserved = report.curves.iter().filter(|c| c.points.iter().all(|p| p.own.is_none()));
+    let mut names: Vec<&str> = unobserved.map(|c| c.solver.as_str()).collect();
+    names.dedup();
+    if !names.is_empty() {
         text += &format!(
             "No curve under the solver's own law (it has none in terms of bias and compliance of normal rows): {}.\n",
-            unobserved.join(", ")
+            names.join(", ")
         );
     }
     text
 }
 
-fn reference_line(report: &ConvergeReport) -> String {
-    match &report.certificate {
-        Some(c) => format!(
-            "Reference: {}, natural-map residual {:.1e}, velocities {}",
-            c.method,
-            c.natural_map,
-            match c.uniqueness {
-                crate::lab::reference::certify::Uniqueness::Proven => "unique (no friction)",
-                crate::lab::reference::certify::Uniqueness::Agreed => "agreed on by two families",
-                crate::lab::reference::certify::Uniqueness::Multiple =>
-                    "NOT unique: use the residual instead of their error",
-                crate::lab::reference::certify::Uniqueness::Unknown => "found by one family only",
-            }
-        ),
-        None => "Reference: none, so no velocity errors".into(),
+/// One row per curve, or two if the solver's own law differs from the rigid one. If these are too many, only
+/// whole schedules in colored order, and of those the first to 1e-4.
+fn rows(report: &ConvergeReport) -> String {
+    let laws = |c: &'_ &ReplayCurve| if c.own_is_rigid { 1 } else { 2 };
+    let mut shown: Vec<&ReplayCurve> = report.curves.iter().collect();
+    let count = |shown: &[&ReplayCurve]| shown.iter().map(laws).sum::<usize>();
+    let all = count(&shown);
+    if all > MOST_ROWS {
+        shown.retain(|c| !c.is_part && (c.order == Sequence::Colored || c.arithmetic == "f64"));
+        shown.retain(|c| !matches!(c.order, Sequence::Shuffled(_)));
+        if count(&shown) > MOST_ROWS {
+            shown.sort_by_key(|c| to(c, &c.rigid, 3).unwrap_or(usize::MAX));
+        }
+        while count(&shown) > MOST_ROWS {
+            shown.pop();
+        }
     }
-}
-
-/// One row per curve, or two if the solver's own law differs from the rigid one.
-fn laws(curve: &ReplayCurve) -> impl Iterator<Item = (&ReplayCurve, &'static str, &Reached)> {
-    let own = (!curve.own_is_rigid).then_some((curve, "own", &curve.own));
-    [(curve, "rigid", &curve.rigid)].into_iter().chain(own)
-}
-
-fn table(last: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
     let mut header: Vec<String> = ["solver", "order", "start", "law"].map(String::from).to_vec();
     header.extend(TOLERANCES.map(|t| format!("{t:.0e}")));
-    header.extend(last.iter().map(|s| s.to_string()));
+    header.extend(["rate", "smallest", "v error", "iteration"].map(String::from));
     table.set_header(header);
-    table
-}
-
-fn align(table: &mut Table) {
+    for curve in &shown {
+        for (law, reached) in [("rigid", &curve.rigid), ("own", &curve.own)].into_iter().take(laws(curve)) {
+            let name = if curve.arithmetic == "f32" { "" } else { " (f64)" };
+            let mut row = vec![format!("{}{name}", curve.solver)];
+            row.extend([curve.order.to_string(), curve.start.to_string(), law.into()]);
+            let number = |value: Option<String>| value.unwrap_or(NEVER.into());
+            row.extend(reached.first.map(|i| number(i.map(|i| iterations(&curve.points[i])))));
+            row.push(number(reached.rate.map(|r| format!("{r:.4}"))));
+            row.push(format!("{:.1e}", reached.smallest));
+            let error = curve.points.last().and_then(|p| p.velocity_error);
+            row.push(number(error.map(|e| format!("{e:.1e}"))));
+            row.push(number(curve.iteration.map(|time| si(1e-9 * time.median_ns, "s"))));
+            table.add_row(row);
+        }
+    }
     for column in table.column_iter_mut().skip(4) {
         column.set_cell_alignment(CellAlignment::Right);
     }
-}
-
-fn head(curve: &ReplayCurve, law: &str) -> Vec<String> {
-    let solver = match curve.arithmetic {
-        "f32" => curve.solver.clone(),
-        other => format!("{} ({other})", curve.solver),
+    let more = match all - count(&shown) {
+        0 => String::new(),
+        more => format!("{more} more rows: converge.csv and converge.json have all curves.\n"),
     };
-    vec![solver, curve.order.to_string(), curve.start.to_string(), law.into()]
+    format!(
+        "Iterations to a residual (iterations/sweeps where they differ), by law; time of an iteration:\n{table}\n{more}"
+    )
 }
 
-fn count(point: &CurvePoint) -> String {
-    if point.iterations as usize == point.sweeps {
-        point.sweeps.to_string()
-    } else {
-        format!("{}/{}", point.iterations, point.sweeps)
+fn iterations(point: &CurvePoint) -> String {
+    match point.iterations as usize == point.sweeps {
+        true => point.sweeps.to_string(),
+        false => format!("{}/{}", point.iterations, point.sweeps),
     }
-}
-
-/// A time (ns) with a suitable unit and three digits.
-fn duration(ns: f64) -> String {
-    let (value, unit) = match ns {
-        0.0 => return "0".into(),
-        ns if ns < 1e3 => (ns, "ns"),
-        ns if ns < 1e6 => (ns / 1e3, "µs"),
-        ns if ns < 1e9 => (ns / 1e6, "ms"),
-        ns => (ns / 1e9, "s"),
-    };
-    let digits = if value < 10.0 { 2 } else { usize::from(value < 100.0) };
-    format!("{value:.digits$} {unit}")
 }
 
 /// A point of a curve, as a line of CSV.
@@ -177,23 +220,21 @@ struct StateLine<'a> {
 pub fn csv(report: &ConvergeReport) -> Result<String, Error> {
     let refuse = |e: String| Error::invalid("converge.csv", e);
     let mut writer = csv::Writer::from_writer(Vec::new());
-    for curve in &report.curves {
-        for p in &curve.points {
-            let line = StateLine {
-                problem: &report.problem,
-                solver: &curve.solver,
-                arithmetic: curve.arithmetic,
-                order: curve.order.to_string(),
-                start: curve.start.to_string(),
-                iterations: p.iterations,
-                sweeps: p.sweeps,
-                time_ns: curve.iteration.map(|each| each.median_ns * f64::from(p.iterations)),
-                rigid_residual: p.rigid,
-                own_residual: p.own,
-                velocity_error: p.velocity_error,
-            };
-            writer.serialize(line).map_err(|e| refuse(e.to_string()))?;
-        }
+    for (curve, p) in report.curves.iter().flat_map(|c| c.points.iter().map(move |p| (c, p))) {
+        let line = StateLine {
+            problem: &report.problem,
+            solver: &curve.solver,
+            arithmetic: curve.arithmetic,
+            order: curve.order.to_string(),
+            start: curve.start.to_string(),
+            iterations: p.iterations,
+            sweeps: p.sweeps,
+            time_ns: curve.iteration.map(|each| each.median_ns * f64::from(p.iterations)),
+            rigid_residual: p.rigid,
+            own_residual: p.own,
+            velocity_error: p.velocity_error,
+        };
+        writer.serialize(line).map_err(|e| refuse(e.to_string()))?;
     }
     let bytes = writer.into_inner().map_err(|e| refuse(e.to_string()))?;
     String::from_utf8(bytes).map_err(|e| refuse(e.to_string()))
@@ -203,15 +244,4 @@ pub fn csv(report: &ConvergeReport) -> Result<String, Error> {
 pub fn json(report: &ConvergeReport) -> Result<String, Error> {
     let text = serde_json::to_string(report);
     Ok(text.map_err(|e| Error::invalid("converge.json", e.to_string()))? + "\n")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn durations_have_three_digits() {
-        let texts = [0.0, 1.234, 12.34, 123.4, 1234.0, 2.5e6, 7e9].map(duration);
-        assert_eq!(texts, ["0", "1.23 ns", "12.3 ns", "123 ns", "1.23 µs", "2.50 ms", "7.00 s"]);
-    }
 }

@@ -89,9 +89,10 @@ pub(super) fn warmed(problem: &ContactProblem, reference: Option<&Reference>) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lab::reference::Target;
     use crate::lab::reference::certify::reference;
     use crate::lab::reference::gallery::{box_pyramid, sliding_box};
-    use crate::lab::reference::residual::{Target, natural_map};
+    use crate::lab::reference::residual::natural_map;
 
     #[test]
     fn drawn_impulses_solve_the_step_before_and_not_this_one() {

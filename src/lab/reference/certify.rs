@@ -1,8 +1,8 @@
 //! Reference solutions, which are accepted only with evidence.
 //!
 //! A solution becomes a reference if its natural-map residual is at most [`CERTIFIED`], measured by
-//! [`super::residual`], which shares no code with the methods. It is also accepted if two methods of
-//! different families agree on the velocities to [`AGREED`] in the mass norm. The evidence is stored with the
+//! [`super::residual`], which shares no code with the methods. It is also accepted if two methods agree
+//! on the velocities to [`AGREED`] in the mass norm. The evidence is stored with the
 //! solution.
 //!
 //! Impulses of a hyperstatic pile form an affine family. Velocities v⁺ and net body impulses Jᵀλ are unique
@@ -10,13 +10,11 @@
 //! only the residual decides whether a solution is right. [`Reference::compare`] therefore never compares
 //! single impulses, and [`Uniqueness`] states whether a distance is meaningful.
 
+use super::iterate::{Iteration, Stop, iterate};
 use super::joints::impulse_sizes;
-use super::newton::newton;
-use super::nncg::nncg;
-use super::problem::{ContactProblem, DPair, Velocity};
-use super::residual::{Target, natural_map};
+use super::problem::{ContactProblem, DPair, Target, Velocity};
+use super::residual::natural_map;
 use super::stewart_trinkle::stewart_trinkle;
-use super::sweeps::{Stop, SweepDirection, pgs};
 use crate::lab::error::plain;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -28,19 +26,25 @@ pub const AGREED: f64 = 1e-8;
 /// Maximum number of contacts for Lemke's method, whose work grows with their cube.
 pub const LEMKE_CONTACTS: usize = 150;
 
+/// Maximum number of row updates of an iterative method, if it makes more than a thousand iterations.
+const MOST_UPDATES: usize = 20_000_000;
+/// Differences that Anderson mixing combines.
+const MIXED: usize = 60;
 /// Maximum number of joint rows to eliminate before Lemke's method. The work grows with their cube.
 pub const LEMKE_ROWS: usize = 450;
 
-/// A family of methods.
+/// A method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// Lemke on the exact LCP.
     StewartTrinkle,
-    /// Semi-smooth Newton.
+    /// Semi-smooth Newton, in files of earlier versions.
     Newton,
-    /// Nonsmooth conjugate gradients.
+    /// Gauss–Seidel with nonsmooth conjugate gradients.
     Nncg,
+    /// Gauss–Seidel with Anderson mixing.
+    Anderson,
     /// Converged projected Gauss–Seidel.
     Pgs,
 }
@@ -51,6 +55,7 @@ impl fmt::Display for Method {
             Method::StewartTrinkle => "Stewart-Trinkle",
             Method::Newton => "Newton",
             Method::Nncg => "NNCG",
+            Method::Anderson => "Anderson",
             Method::Pgs => "PGS",
         })
     }
@@ -62,11 +67,11 @@ impl fmt::Display for Method {
 pub enum Uniqueness {
     /// Without friction, the velocities solve a strictly convex problem.
     Proven,
-    /// Two families of methods found the same velocities.
+    /// Two methods found the same velocities.
     Agreed,
-    /// Two families found different velocities, each certified: only a residual can decide.
+    /// Two methods found different velocities, each certified: only a residual can decide.
     Multiple,
-    /// Only one family found a solution.
+    /// Only one method found a solution.
     Unknown,
 }
 
@@ -90,7 +95,7 @@ pub struct Certificate {
     pub method: Method,
     /// Natural-map residual, see [`certify`] (1).
     pub natural_map: f64,
-    /// The solution of another family, if one ended with finite impulses.
+    /// The solution of another method, if one ended with finite impulses.
     pub witness: Option<Witness>,
     /// Whether the velocities are unique.
     pub uniqueness: Uniqueness,
@@ -192,17 +197,22 @@ struct Attempt {
 }
 
 /// Solves by one method; `None` if it ended without finite impulses. Budgets grow at most linearly with the
-/// number of contacts.
+/// number of rows.
 fn attempt(problem: &ContactProblem, method: Method) -> Option<Attempt> {
     let cold = problem.no_impulses();
     // Two decades below the certificate. The scale of the certificate is at least as large as that of the
     // history.
-    let stop = |iterations| Stop { tolerance: 0.01 * CERTIFIED, iterations };
+    let iterated = |method, most| {
+        let iterations = (MOST_UPDATES / problem.unknowns().max(1)).clamp(1_000, most);
+        let stop = Stop { tolerance: 0.01 * CERTIFIED, iterations };
+        iterate(problem, Target::Rigid, &cold, method, stop).impulses
+    };
     let impulses = match method {
         Method::StewartTrinkle => stewart_trinkle(problem, Target::Rigid).ok()?,
-        Method::Newton => newton(problem, Target::Rigid, &cold, stop(60)).impulses,
-        Method::Nncg => nncg(problem, Target::Rigid, &cold, stop(5_000)).impulses,
-        Method::Pgs => pgs(problem, Target::Rigid, &cold, SweepDirection::Symmetric, stop(5_000)).impulses,
+        Method::Newton => return None,
+        Method::Nncg => iterated(Iteration::Conjugate, 5_000),
+        Method::Anderson => iterated(Iteration::Anderson(MIXED), 10_000),
+        Method::Pgs => iterated(Iteration::Symmetric, 5_000),
     };
     let natural_map = certify(problem, &impulses);
     let velocities = problem.velocities(&impulses);
@@ -211,12 +221,12 @@ fn attempt(problem: &ContactProblem, method: Method) -> Option<Attempt> {
 
 /// Solves the rigid contact law and certifies the solution.
 ///
-/// Methods run in the order Stewart–Trinkle (small problems), NNCG, Newton, PGS, until two are certified or
+/// Methods run in the order Stewart–Trinkle (small problems), Anderson, NNCG, PGS, until two are certified or
 /// all have run. The first certified solution is the reference, the other one its witness.
 pub fn reference(problem: &ContactProblem) -> Result<Reference, NoReference> {
     let fail = |why| NoReference { problem: problem.name.clone(), why };
     problem.validate().map_err(|e| fail(e.to_string()))?;
-    let mut methods = vec![Method::Nncg, Method::Newton, Method::Pgs];
+    let mut methods = vec![Method::Anderson, Method::Nncg, Method::Pgs];
     if problem.contacts.len() <= LEMKE_CONTACTS && problem.joint_rows() <= LEMKE_ROWS {
         methods.insert(0, Method::StewartTrinkle);
     }
@@ -290,8 +300,8 @@ mod tests {
         let p = box_pyramid(12, 0.6);
         assert!(p.contacts.len() > LEMKE_CONTACTS);
         let r = reference(&p).unwrap();
-        assert_eq!(r.certificate.method, Method::Nncg);
-        assert_eq!(r.certificate.witness.unwrap().method, Method::Newton);
+        assert_eq!(r.certificate.method, Method::Anderson);
+        assert_eq!(r.certificate.witness.unwrap().method, Method::Nncg);
         assert_eq!(r.certificate.uniqueness, Uniqueness::Agreed);
         assert!(p.mass_norm(&r.velocities) < 1e-11);
     }

@@ -328,3 +328,163 @@ pub fn library() -> Vec<(&'static str, ContactProblem)> {
         ("machine", machine()),
     ]
 }
+
+/// Every method finds the solutions that the docs derive.
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::reference::certify::{Uniqueness, reference};
+    use crate::lab::reference::iterate::{Iteration, Stop, iterate};
+    use crate::lab::reference::residual::natural_map;
+    use crate::lab::reference::rows::OwnRow;
+    use crate::lab::reference::stewart_trinkle::stewart_trinkle;
+    use crate::lab::reference::{DPair, Target};
+
+    /// Impulses by Lemke's method, certified by the residual code, which shares nothing with the LCP.
+    fn solve(p: &ContactProblem) -> Vec<DPair> {
+        p.validate().unwrap();
+        let impulses = stewart_trinkle(p, Target::Rigid).unwrap();
+        let residual = natural_map(p, Target::Rigid, &p.velocities(&impulses), &impulses) / p.impulse_unit();
+        assert!(residual < 1e-12, "{}: natural map {residual:e}", p.name);
+        impulses
+    }
+
+    fn close(what: &str, found: f64, expected: f64) {
+        let error = (found - expected).abs();
+        assert!(error <= 1e-12 * expected.abs().max(1e-3), "{what}: {found} is not {expected}");
+    }
+
+    /// Impulses by hand: point or row, direction, N·s.
+    type ByHand = Vec<(usize, usize, f64)>;
+
+    fn by_hand() -> Vec<(ContactProblem, ByHand)> {
+        let load = GRAVITY * H;
+        let mut all = Vec::new();
+        let forces = [(0, 0, 7.0), (1, 0, 13.0), (0, 1, -0.3 * 7.0), (1, 1, -0.3 * 13.0)];
+        all.push((sliding_box(), forces.map(|(i, axis, force)| (i, axis, force * H)).to_vec()));
+        let column = |n: usize| (0..n).map(move |i| (i, 0, (n - i) as f64 * load)).collect();
+        all.extend([1, 10].map(|n| (disc_column(n), column(n))));
+        for (h, force) in [(1e-2, 0.385), (1e-3, 0.3085), (1e-4, 0.30085)] {
+            all.push((painleve_rod(h), vec![(0, 0, force), (0, 1, 0.4 + 0.3 * GRAVITY * h)]));
+        }
+        // The classical quarter of the weight, and oblique rods, by Cramer's rule.
+        for angle in [0.0_f64, 0.7, -1.2] {
+            let (x, y) = (0.5 * angle.cos(), 0.5 * angle.sin());
+            let k = [1.0 + 12.0 * y * y, -12.0 * x * y, 1.0 + 12.0 * x * x];
+            let determinant = k[0] * k[2] - k[1] * k[1];
+            let hinge = vec![(0, 0, -k[1] * load / determinant), (1, 0, k[0] * load / determinant)];
+            all.push((pendulum_rod(angle), hinge));
+        }
+        close("a quarter", all[all.len() - 3].1[1].2, load / 4.0);
+        let chain = |i: usize| [(2 * i, 0, 0.0), (2 * i + 1, 0, (6 - i) as f64 * load)];
+        all.push((hanging_chain(6), (0..6).flat_map(chain).collect()));
+        // The contact, the motor and its hinge, the limit and its hinge, the springs.
+        let omega = -1e-4 / H;
+        let limit = [(4, 0, (omega + 1.5 * load) / 3.0), (6, 0, load + 0.5 * omega)];
+        let machine_by_hand = [(0, 0, load), (0, 1, 0.01), (1, 0, 0.01), (2, 0, 0.0), (3, 0, load)];
+        let springs = [(7, 0, (0.5 * load + 0.2) / 1.5), (8, 0, -0.01)];
+        all.push((machine(), [&machine_by_hand[..], &limit, &springs].concat()));
+        // Without damping a spring pushes with −S C, whatever the velocity.
+        let mut stiff = machine();
+        stiff.joints[2].blocks[0].law = BlockLaw::Spring { stiffness: 20.0, damping: 0.0, cap: None };
+        all.push((stiff, vec![(7, 0, 0.2)]));
+        all
+    }
+
+    #[test]
+    fn every_method_finds_the_solutions_by_hand() {
+        for (p, expected) in by_hand() {
+            let stop = Stop { tolerance: 1e-15, iterations: 4000 };
+            let by = |method| iterate(&p, Target::Rigid, &p.no_impulses(), method, stop).impulses;
+            let methods =
+                [Iteration::Conjugate, Iteration::Anderson(10), Iteration::Symmetric, Iteration::SplitJacobi];
+            for (i, axis, impulse) in expected {
+                let name = format!("{}, {i} {axis}", p.name);
+                close(&format!("{name}, Lemke"), solve(&p)[i][axis], impulse);
+                for method in methods {
+                    let found = by(method)[i][axis];
+                    assert!((found - impulse).abs() < 1e-11, "{name}, {method:?}: {found} is not {impulse}");
+                }
+            }
+        }
+        let v = machine().velocities(&solve(&machine()));
+        close("motor", v[0][2], 0.02);
+        close("limit", v[1][2], -1e-4 / H);
+    }
+
+    /// Large columns, mass ratios, pyramids; hyperstatic planks and a rod on two identical hinges.
+    #[test]
+    fn exact_solutions_where_sweeps_are_slow_or_impulses_not_unique() {
+        let load = GRAVITY * H;
+        for (i, l) in solve(&disc_column(60)).iter().enumerate() {
+            close("column", l[0], (60 - i) as f64 * load);
+        }
+        // The scaled G has the condition number 4 R = 4e4, which multiplies rounding (1e-16).
+        for (l, mass) in solve(&heavy_on_light(1e4)).iter().zip([10001.0, 10000.0]) {
+            assert!((l[0] / (mass * load) - 1.0).abs() < 1e-11, "{} is not {mass}", l[0]);
+        }
+        for mu in [0.0, 0.5] {
+            let p = plank(&[-1.5, -0.5, 0.5, 1.5], mu);
+            let l = solve(&p);
+            close("plank", l.iter().map(|l| l[0]).sum(), load);
+            assert!(p.mass_norm(&p.velocities(&l)) < 1e-15);
+        }
+        let mut p = pendulum_rod(0.0);
+        p.joints.push(p.joints[0].clone());
+        let l = solve(&p);
+        close("hinges", l[1][0] + l[3][0], load / 4.0);
+        assert_eq!(reference(&p).unwrap().certificate.uniqueness, Uniqueness::Proven);
+        // 21 boxes fall at 1/24 m/s; rest to rounding.
+        let p = box_pyramid(6, 0.6);
+        assert!(p.contacts.len() > 100 && p.contacts.len() < 150, "{}", p.contacts.len());
+        assert!(p.mass_norm(&p.velocities(&solve(&p))) < 1e-13);
+    }
+
+    #[test]
+    fn blocks_stick_and_discs_roll_up_to_their_angles() {
+        let slope: f64 = 0.25;
+        let (sin, cos, tan) = (slope.sin(), slope.cos(), slope.tan());
+        for (factor, sticks) in [(1.0 + 1e-9, true), (1.0 - 1e-9, false)] {
+            let p = block_on_incline(slope, factor * tan);
+            let v = p.velocities(&solve(&p))[0];
+            let slides = p.h * GRAVITY * (sin - factor * tan * cos).max(0.0);
+            // The gain near the threshold is 1e-11 m/s, still 10⁵ roundings of v*.
+            assert!((v[0] + slides).abs() < 1e-15, "{v:?} {slides:e}");
+            assert_eq!(v[0].abs() < 1e-12, sticks);
+        }
+        let third = tan / 3.0;
+        for (mu, rolls) in [(third * (1.0 + 1e-9), true), (third * (1.0 - 1e-6), false), (0.05, false)] {
+            let p = disc_on_incline(slope, mu);
+            let v = p.velocities(&solve(&p))[0];
+            let gain = if rolls { 2.0 / 3.0 * sin } else { sin - mu * cos };
+            close("disc", v[0], -p.h * GRAVITY * gain);
+            assert_eq!((v[0] + 0.5 * v[2]).abs() < 1e-14, rolls, "{v:?}");
+        }
+    }
+
+    #[test]
+    fn targets_yield_close_and_rebound() {
+        // u + b + c λ = 0 with u = −g h + λ: λ = (g h − b)/(1 + c).
+        let p = disc_column(1);
+        let rows = [OwnRow { bias: -0.01, compliance: 0.5 }];
+        let own = Target::Own(&rows);
+        let stop = Stop { tolerance: 1e-15, iterations: 100 };
+        let swept = iterate(&p, own, &p.no_impulses(), Iteration::Forward, stop).impulses;
+        for l in [stewart_trinkle(&p, own).unwrap(), swept] {
+            close("compliant", l[0][0], (GRAVITY * p.h + 0.01) / 1.5);
+            assert!(natural_map(&p, own, &p.velocities(&l), &l) < 1e-15);
+            assert!(natural_map(&p, Target::Rigid, &p.velocities(&l), &l) > 1e-3);
+        }
+        // A disc falls at 2 m/s; h = 1/240 s.
+        let disc = |gap: f64, rebound: f64| {
+            let mut p = disc_column(1);
+            p.bodies[0].free_velocity[1] = -2.0;
+            (p.contacts[0].gap, p.contacts[0].rebound) = (gap, rebound);
+            p.velocities(&solve(&p))[0][1]
+        };
+        close("a gap closes", disc(1.0 / 480.0, 0.0), -0.5);
+        close("a gap is open", disc(0.1, 0.0), -2.0);
+        assert!(disc(-0.1, 0.0).abs() < 1e-15);
+        close("a rebound", disc(0.0, 1.5), 1.5);
+    }
+}

@@ -145,15 +145,6 @@ pub(super) enum BlockBound {
 }
 
 impl BlockBound {
-    /// Whether impulses are inside the bound, so that they depend on velocities.
-    pub fn is_inside(self, y: RowVector) -> bool {
-        match self {
-            BlockBound::None => true,
-            BlockBound::Positive => y[0] > 0.0,
-            BlockBound::Cap(cap) => y.iter().map(|y| y * y).sum::<f64>().sqrt() < cap,
-        }
-    }
-
     /// Π; NaN stays NaN.
     pub fn project(self, mut y: RowVector) -> RowVector {
         match self {

@@ -19,8 +19,8 @@
 //! **Cost**: O(n²) per pivot with n ≤ 4 rows per contact, and O(n³) for n joint rows. Meant for up to about
 //! 150 contacts.
 
-use super::problem::{ContactProblem, DPair, Velocity};
-use super::residual::{Target, natural_map};
+use super::problem::{ContactProblem, DPair, Target, Velocity};
+use super::residual::natural_map;
 use super::rows::BlockBound;
 use crate::engine::constraints::numerics::coulomb_lcp::CoulombLcp;
 use crate::engine::constraints::numerics::lemke::LemkeOutcome;
@@ -41,35 +41,13 @@ const REDUNDANT: f64 = 1e-11;
 /// Lemke's paths on a spurious ray or at an inaccurate basis. Other covering vectors are then tried, and the
 /// answer with the smallest residual is returned.
 pub fn stewart_trinkle(problem: &ContactProblem, target: Target) -> Result<Vec<DPair>, LemkeOutcome> {
-    if !problem.joints.is_empty() {
-        let eliminated = Eliminated::new(problem, target);
-        let lcp = eliminated.lcp()?;
-        return by_lemke(problem, target, &lcp, |pairs| eliminated.impulses(pairs));
-    }
-    let rows: Vec<_> = (0..problem.contacts.len()).map(|i| target.row(problem, i)).collect();
-    let free = problem.contact_velocities(&problem.velocities(&vec![[0.0; 2]; rows.len()]));
-    let free: Vec<DPair> = free.iter().zip(&rows).map(|(u, row)| [u[0] + row.bias, u[1]]).collect();
-    let friction: Vec<f64> = problem.contacts.iter().map(|c| c.friction).collect();
-    let g = problem.delassus();
-    let lcp = CoulombLcp::new(&friction, &problem.delassus_diagonal(), &free, |i, j| {
-        g[(i, j)] + if i == j && i % 2 == 0 { rows[i / 2].compliance } else { 0.0 }
-    });
-    by_lemke(problem, target, &lcp, Some)
-}
-
-/// The best answer of several paths. `whole` converts impulses of the LCP to those of the problem, or rejects
-/// them.
-fn by_lemke(
-    problem: &ContactProblem,
-    target: Target,
-    lcp: &CoulombLcp,
-    whole: impl Fn(Vec<DPair>) -> Option<Vec<DPair>>,
-) -> Result<Vec<DPair>, LemkeOutcome> {
+    let eliminated = Eliminated::new(problem, target);
+    let lcp = eliminated.lcp()?;
     let mut best: Result<(f64, Vec<DPair>), LemkeOutcome> = Err(LemkeOutcome::Ray);
     for path in 0..PATHS {
         match lcp.solve(&covering_vector(lcp.rows(), path), PIVOTS_PER_ROW * lcp.rows() + 100) {
-            Ok(l) => {
-                let Some(l) = whole(l) else { continue };
+            Ok(pairs) => {
+                let Some(l) = eliminated.impulses(pairs) else { continue };
                 let residual =
                     natural_map(problem, target, &problem.velocities(&l), &l) / problem.impulse_unit();
                 if best.as_ref().map_or(true, |(least, _)| residual < *least) {
@@ -85,7 +63,7 @@ fn by_lemke(
     best.map(|(_, impulses)| impulses)
 }
 
-/// A problem with joints, with its free rows eliminated.
+/// A problem with the free rows of its joints eliminated.
 struct Eliminated<'a> {
     problem: &'a ContactProblem,
     /// G + R, with b as its last column. Rows of `pivots` keep their values at elimination. A contact has two
@@ -110,20 +88,10 @@ impl<'a> Eliminated<'a> {
         let contacts = 2 * problem.contacts.len();
         let lines = problem.lines(target);
         let n = contacts + problem.joint_rows();
-        // The bodies of every row, with their part of J.
-        let mut sides: Vec<Vec<(usize, Velocity)>> = Vec::with_capacity(n);
-        for c in &problem.contacts {
-            for direction in 0..2 {
-                sides.push(c.sides().map(|(body, rows)| (body, rows[direction])).collect());
-            }
-        }
         let (mut fixed, mut free, mut limits, mut caps, mut balls) = (vec![], vec![], vec![], vec![], vec![]);
         let mut start = problem.no_impulses();
         for line in &lines {
-            let first = sides.len();
-            for i in 0..line.size {
-                sides.push(line.sides.iter().map(|(body, rows)| (*body, rows[i])).collect());
-            }
+            let first = contacts + line.first - problem.contacts.len();
             let held = line.fixed();
             fixed.extend((0..line.size).map(|i| held.map(|held| held[i])));
             match (held, line.bound) {
@@ -138,21 +106,29 @@ impl<'a> Eliminated<'a> {
                 }
             }
         }
-        let inverse = |body: usize| {
-            let b = &problem.bodies[body];
-            [b.inv_mass, b.inv_mass, b.inv_inertia]
+        // J v of all rows.
+        let speeds = |v: &[Velocity]| -> Vec<f64> {
+            let joints = lines.iter().flat_map(|line| line.velocity(v).into_iter().take(line.size));
+            problem.contact_velocities(v).into_iter().flatten().chain(joints).collect()
         };
-        let mut cells = Matrix::from_fn(n, n + 1, |row, column| {
-            let Some(other) = sides.get(column) else { return 0.0 };
-            let common =
-                sides[row].iter().flat_map(|a| other.iter().filter(move |b| a.0 == b.0).map(move |b| (a, b)));
-            common.map(|(a, b)| (0..3).map(|k| inverse(a.0)[k] * a.1[k] * b.1[k]).sum::<f64>()).sum()
-        });
-        let velocities = problem.velocities(&start);
-        for (row, sides) in sides.iter().enumerate() {
-            cells[(row, n)] =
-                sides.iter().map(|(body, j)| (0..3).map(|k| j[k] * velocities[*body][k]).sum::<f64>()).sum();
+        let mut cells = Matrix::zeros(n, n + 1);
+        let mut write = |column: usize, of: Vec<f64>| {
+            of.into_iter().enumerate().for_each(|(row, x)| cells[(row, column)] = x);
+        };
+        let still = vec![[0.0; 3]; problem.bodies.len()];
+        for (i, c) in problem.contacts.iter().enumerate() {
+            for (axis, unit) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
+                let mut v = still.clone();
+                problem.apply(c, unit, &mut v);
+                write(2 * i + axis, speeds(&v));
+            }
         }
+        for (line, i) in lines.iter().flat_map(|line| (0..line.size).map(move |i| (line, i))) {
+            let mut v = still.clone();
+            line.apply(problem, [0, 1, 2].map(|k| if k == i { 1.0 } else { 0.0 }), &mut v);
+            write(contacts + line.first - problem.contacts.len() + i, speeds(&v));
+        }
+        write(n, speeds(&problem.velocities(&start)));
         for i in 0..problem.contacts.len() {
             let law = target.row(problem, i);
             cells[(2 * i, n)] += law.bias;
@@ -264,145 +240,4 @@ impl<'a> Eliminated<'a> {
 fn covering_vector(n: usize, path: usize) -> Vec<f64> {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     (1..=n).map(|i| if path == 0 { 1.0 } else { 0.5 + 0.5 * (GOLDEN * (i * path) as f64).fract() }).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::lab::reference::gallery::*;
-    use crate::lab::reference::residual::natural_map;
-
-    /// Impulses, certified by the residual code, which shares nothing with the LCP.
-    fn solve(problem: &ContactProblem) -> Vec<DPair> {
-        problem.validate().unwrap();
-        let impulses = stewart_trinkle(problem, Target::Rigid).unwrap();
-        let residual = natural_map(problem, Target::Rigid, &problem.velocities(&impulses), &impulses);
-        let relative = residual / problem.impulse_unit();
-        assert!(relative < 1e-12, "{}: natural map {relative:e}", problem.name);
-        impulses
-    }
-
-    fn close(a: f64, b: f64) {
-        assert!((a - b).abs() <= 1e-12 * b.abs().max(1e-3), "{a} is not {b}");
-    }
-
-    #[test]
-    fn sliding_box_leans_on_its_front() {
-        let p = sliding_box();
-        let l = solve(&p);
-        [(0, 7.0), (1, 13.0)].iter().for_each(|&(i, force)| {
-            close(l[i][0], force * p.h);
-            close(l[i][1], -0.3 * force * p.h);
-        });
-        let v = p.velocities(&l)[0];
-        close(v[0], 1.0 - 0.3 * GRAVITY * p.h);
-        assert!(v[1].abs() < 1e-15 && v[2].abs() < 1e-15);
-    }
-
-    #[test]
-    fn block_sticks_up_to_the_friction_angle() {
-        let slope: f64 = 0.25;
-        for (factor, sticks) in [(1.0 + 1e-9, true), (1.0 - 1e-9, false)] {
-            let mu = factor * slope.tan();
-            let p = block_on_incline(slope, mu);
-            let v = p.velocities(&solve(&p))[0];
-            let slides = p.h * GRAVITY * (slope.sin() - mu * slope.cos()).max(0.0);
-            // The gain near the threshold is 1e-11 m/s, still 10⁵ roundings of v*.
-            assert!((v[0] + slides).abs() < 1e-15, "{v:?} {slides:e}");
-            assert_eq!(v[0].abs() < 1e-12, sticks);
-        }
-    }
-
-    #[test]
-    fn disc_rolls_above_a_third_of_the_tangent() {
-        let slope: f64 = 0.25;
-        for (mu, rolls) in [
-            (slope.tan() / 3.0 * (1.0 + 1e-9), true),
-            (slope.tan() / 3.0 * (1.0 - 1e-6), false),
-            (0.05, false),
-        ] {
-            let p = disc_on_incline(slope, mu);
-            let v = p.velocities(&solve(&p))[0];
-            let gain = if rolls { 2.0 / 3.0 * slope.sin() } else { slope.sin() - mu * slope.cos() };
-            close(v[0], -p.h * GRAVITY * gain);
-            assert_eq!((v[0] + 0.5 * v[2]).abs() < 1e-14, rolls, "{v:?}");
-        }
-    }
-
-    #[test]
-    fn columns_carry_what_lies_above() {
-        for n in [1, 10, 60] {
-            let p = disc_column(n);
-            for (i, l) in solve(&p).iter().enumerate() {
-                close(l[0], (n - i) as f64 * GRAVITY * p.h);
-            }
-        }
-        let p = heavy_on_light(1e4);
-        let l = solve(&p);
-        // The scaled G has the condition number 4 R = 4e4, which multiplies rounding (1e-16).
-        for (i, mass) in [(0, 10001.0), (1, 10000.0)] {
-            let truth = mass * GRAVITY * p.h;
-            assert!((l[i][0] - truth).abs() < 1e-11 * truth, "{} is not {truth}", l[i][0]);
-        }
-    }
-
-    #[test]
-    fn painleve_rod_is_stopped_by_friction() {
-        for (h, force) in [(1e-2, 0.385), (1e-3, 0.3085), (1e-4, 0.30085)] {
-            let p = painleve_rod(h);
-            let l = solve(&p);
-            close(l[0][0], force);
-            close(l[0][1], 0.4 + 0.3 * GRAVITY * h);
-            let tip = p.contact_velocities(&p.velocities(&l))[0];
-            assert!(tip[0].abs() < 1e-14 && tip[1].abs() < 1e-14, "{tip:?}");
-        }
-    }
-
-    #[test]
-    fn hyperstatic_plank_rests_with_the_right_sum() {
-        for mu in [0.0, 0.5] {
-            let p = plank(&[-1.5, -0.5, 0.5, 1.5], mu);
-            let l = solve(&p);
-            let [px, py, moment] = p.body_impulses(&l)[0];
-            assert!(px.abs() < 1e-16 && moment.abs() < 1e-16, "{px:e} {moment:e}");
-            close(py, GRAVITY * p.h);
-            assert!(p.mass_norm(&p.velocities(&l)) < 1e-15);
-        }
-    }
-
-    #[test]
-    fn compliant_contact_yields_in_proportion() {
-        use crate::lab::reference::residual::OwnRow;
-        // u + b + c λ = 0 with u = −g h + λ: λ = (g h − b)/(1 + c).
-        let p = disc_column(1);
-        let rows = [OwnRow { bias: -0.01, compliance: 0.5 }];
-        let l = stewart_trinkle(&p, Target::Own(&rows)).unwrap();
-        close(l[0][0], (GRAVITY * p.h + 0.01) / 1.5);
-        assert!(natural_map(&p, Target::Own(&rows), &p.velocities(&l), &l) < 1e-17);
-        assert!(natural_map(&p, Target::Rigid, &p.velocities(&l), &l) > 1e-3);
-    }
-
-    #[test]
-    fn gaps_close_overlaps_stay_and_rebounds_rebound() {
-        // A disc falls at 2 m/s; h = 1/240 s.
-        let disc = |gap: f64, rebound: f64| {
-            let mut p = disc_column(1);
-            p.bodies[0].free_velocity[1] = -2.0;
-            (p.contacts[0].gap, p.contacts[0].rebound) = (gap, rebound);
-            p.velocities(&solve(&p))[0][1]
-        };
-        close(disc(1.0 / 480.0, 0.0), -0.5);
-        close(disc(0.1, 0.0), -2.0);
-        assert!(disc(-0.1, 0.0).abs() < 1e-15);
-        close(disc(0.0, 1.5), 1.5);
-    }
-
-    #[test]
-    fn a_pyramid_of_100_contacts_rests() {
-        let p = box_pyramid(6, 0.6);
-        assert!(p.contacts.len() > 100 && p.contacts.len() < 150, "{}", p.contacts.len());
-        let l = solve(&p);
-        // 21 boxes fall at 1/24 m/s; rest to rounding.
-        assert!(p.mass_norm(&p.velocities(&l)) < 1e-13);
-    }
 }

@@ -243,26 +243,6 @@ pub static CONVERGE: Sheet = Sheet {
     ],
 };
 
-/// `agree.csv`
-pub static AGREE: Sheet = Sheet {
-    file: "agree.csv",
-    command: "simpulse agree",
-    line: "a solver on a problem after some iterations or substeps",
-    columns: &[
-        column("solver", "", "name of the solver"),
-        column("problem", "", "name of the problem"),
-        column("unit", "", "what is counted: iterations or substeps"),
-        column("count", "", "how many of them"),
-        column("residual_ours", "1", "residual of the rigid contact law, in the problem's unit of impulse"),
-        column("residual_f64", "1", "that of the source's method in f64"),
-        column(
-            "apart",
-            "1",
-            "largest distance of velocities, places and impulses from that method, relative",
-        ),
-    ],
-};
-
 /// `growth.csv`
 pub static GROWTH: Sheet = Sheet {
     file: "growth.csv",
@@ -366,7 +346,7 @@ pub static JOINTS: Sheet = Sheet {
 };
 
 /// All kinds of CSV files.
-pub static SHEETS: [&Sheet; 7] = [&STUDY, &CONVERGE, &AGREE, &GROWTH, &STATE, &CONTACTS, &JOINTS];
+pub static SHEETS: [&Sheet; 6] = [&STUDY, &CONVERGE, &GROWTH, &STATE, &CONTACTS, &JOINTS];
 
 impl Sheet {
     /// Names of the columns, in order.

@@ -1,73 +1,54 @@
-//! The methods that iterate on the vector of all impulses; as [`super::schedules`].
+//! The methods that iterate on the vector of all impulses; as [`super::methods`].
 
-use super::model::{Model, ScalarRule, ScalarSweep};
-use super::schedules::{CAP, Run};
-use crate::lab::reference::residual::project_cone;
-use crate::lab::reference::{DPair, sparse};
+use super::Model;
+use super::methods::{CAP, Run};
+use super::rules::ScalarRule;
+use simpulse::lab::reference::DPair;
+use simpulse::lab::reference::iterate::{Acceleration, Anderson, ConjugateSweeps, dot, plus};
+use simpulse::lab::reference::oracle::{GapRule, ScalarSweep};
 
-fn dot(a: &[DPair], b: &[DPair]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a[0] * b[0] + a[1] * b[1]).sum()
-}
-
-/// a + s b
-fn plus(a: &[DPair], s: f64, b: &[DPair]) -> Vec<DPair> {
-    a.iter().zip(b).map(|(a, b)| [a[0] + s * b[0], a[1] + s * b[1]]).collect()
+/// Sweeps with an extrapolation after each; with `plain`, not after the last.
+fn accelerated(model: &mut Model, run: &Run, mut by: impl Acceleration, plain: bool) {
+    let (sweep, count) = (ScalarSweep::new(run.baumgarte()), run.budget.velocity_iterations);
+    model.accelerate();
+    model.warm_start(false);
+    for k in 0..count {
+        let before = model.l.clone();
+        model.sweep(&sweep);
+        if k + 1 < count || !plain {
+            let next = by.next(&before, &model.l);
+            model.jump(&next);
+        }
+    }
+    model.advance();
 }
 
 pub(super) fn nncg(model: &mut Model, run: &Run) {
-    let sweep = ScalarSweep::new(run.baumgarte());
-    let count = run.budget.velocity_iterations;
-    model.accelerate();
-    model.warm_start(false);
-    let (mut p, mut previous) = (vec![[0.0; 2]; model.l.len()], f64::INFINITY);
-    for k in 0..count {
-        let before = model.l.clone();
-        model.sweep(&sweep);
-        if k + 1 == count && !run.undoes(0) {
-            break;
-        }
-        let r = plus(&model.l, -1.0, &before);
-        let square = dot(&r, &r);
-        let beta = if square <= previous && square > 0.0 { square / previous } else { 0.0 };
-        previous = square;
-        model.jump(&plus(&model.l, beta, &p));
-        p = plus(&r, beta, &p);
-    }
-    model.advance();
+    accelerated(model, run, ConjugateSweeps::default(), !run.undoes(0));
 }
 
 pub(super) fn anderson(model: &mut Model, run: &Run) {
-    let sweep = ScalarSweep::new(run.baumgarte());
-    let (count, depth) = (run.budget.velocity_iterations, run.get("depth") as usize);
-    model.accelerate();
-    model.warm_start(false);
-    // f and g of the sweeps since the last restart.
-    let mut seen: Vec<[Vec<DPair>; 2]> = Vec::new();
-    for k in 0..count {
-        let before = model.l.clone();
-        model.sweep(&sweep);
-        if k + 1 == count {
-            break;
-        }
-        let (f, g) = (plus(&model.l, -1.0, &before), model.l.clone());
-        if seen.last().is_some_and(|[last, _]| dot(&f, &f) > 4.0 * dot(last, last)) && !run.undoes(0) {
-            seen.clear();
-        }
-        seen.push([f, g]);
-        let difference = |at: usize, of: usize| plus(&seen[at][of], -1.0, &seen[at - 1][of]);
-        let columns: Vec<usize> = (1..seen.len()).rev().take(depth).collect();
-        let [df, dg] = [0, 1].map(|of| columns.iter().map(|&at| difference(at, of)).collect::<Vec<_>>());
-        let [f, g] = &seen[seen.len() - 1];
-        let trace: f64 = df.iter().map(|a| dot(a, a)).sum();
-        let entry = |i: usize, j: usize| dot(&df[i], &df[j]) + if i == j { 1e-9 * trace } else { 0.0 };
-        let gram = (0..df.len()).flat_map(|i| (0..df.len()).map(move |j| (i, j)));
-        let right: Vec<f64> = df.iter().map(|a| dot(a, f)).collect();
-        let gamma =
-            sparse::solve(gram.map(|(i, j)| (i, j, entry(i, j))).collect(), &right).unwrap_or_default();
-        let next = gamma.iter().zip(&dg).fold(g.clone(), |next, (gamma, dg)| plus(&next, -gamma, dg));
-        model.jump(&next);
+    let mut mixing = Anderson::new(run.get("depth") as usize);
+    (mixing.restarts, mixing.damps_sum, mixing.damping) = (!run.undoes(0), true, 1e-9);
+    accelerated(model, run, mixing, true);
+}
+
+/// b of every normal row (m/s), under a rule without springs.
+fn biases(model: &Model, rule: ScalarRule) -> Vec<f64> {
+    (0..model.l.len()).map(|i| rule.line(model, i).push).collect()
+}
+
+/// Euclidean projection onto the wedge K = {λn ≥ 0, |λt| ≤ µ λn}: the identity inside K, the apex in the polar
+/// wedge {µ|λt| ≤ −λn}. Elsewhere the nearest point on the nearer edge (1, ±µ)/√(1 + µ²): n' = (λn + µ|λt|)/(1 + µ²).
+fn project_cone(mu: f64, [ln, lt]: DPair) -> DPair {
+    if ln >= 0.0 && lt.abs() <= mu * ln {
+        [ln, lt]
+    } else if mu * lt.abs() <= -ln {
+        [0.0, 0.0]
+    } else {
+        let n = (ln + mu * lt.abs()) / (1.0 + mu * mu);
+        [n, (mu * n).copysign(lt)]
     }
-    model.advance();
 }
 
 /// u = J v(λ) + b, and the effective masses of normal rows.
@@ -81,12 +62,18 @@ impl VectorLaw {
     fn new(model: &Model, rule: ScalarRule) -> Self {
         let friction = model.problem.contacts.iter().map(|c| c.friction).collect();
         let mass = (0..model.l.len()).map(|i| model.mass(&model.rows(i, false), 0)).collect();
-        VectorLaw { bias: model.bias(rule), mass, friction }
+        VectorLaw { bias: biases(model, rule), mass, friction }
     }
 
     fn speeds(&self, model: &mut Model, at: &[DPair]) -> Vec<DPair> {
         model.jump(at);
-        model.speeds().into_iter().zip(&self.bias).map(|(u, b)| [u[0] + b, u[1]]).collect()
+        model
+            .problem
+            .contact_velocities(&model.v)
+            .into_iter()
+            .zip(&self.bias)
+            .map(|(u, b)| [u[0] + b, u[1]])
+            .collect()
     }
 
     fn project(&self, l: &[DPair]) -> Vec<DPair> {
@@ -147,7 +134,7 @@ pub(super) fn apgd(model: &mut Model, run: &Run) {
 pub(super) fn sap(model: &mut Model, run: &Run) {
     model.accelerate();
     model.warm_start(false);
-    let push = model.bias(ScalarRule::Baumgarte(run.get("baumgarte"), 0.0, CAP));
+    let push = biases(model, ScalarRule::Baumgarte(run.get("baumgarte"), 0.0, CAP));
     for i in (0..5000).flat_map(|_| 0..push.len()) {
         let (rows, l, mu) = (model.rows(i, false), model.l[i], model.problem.contacts[i].friction);
         let k = |a, b| model.coupling((&rows, a), (&rows, b));

@@ -1,11 +1,14 @@
 //! The methods as described by their sources, a function each. They include the departures of the solver
-//! here, except the one with index [`Run::undo`] in the [table](super::table), which is done as the source
+//! here, except the one with index [`Run::undo`] in sources.md, which is done as the source
 //! does it.
 
-use super::model::{Model, RowOrder, ScalarRule, ScalarSpring, ScalarSweep};
-use crate::engine::params::Budget;
-use crate::engine::solvers::{Variant, xpbd as positions};
-use crate::lab::reference::DPair;
+use super::rules::{ScalarRule, ScalarSpring, positions, positions_in_pairs};
+use super::{Model, vectors};
+use simpulse::engine::constraints::numerics::matrix::solve_in_place;
+use simpulse::engine::params::Budget;
+use simpulse::engine::solvers::{Variant, xpbd as displacements};
+use simpulse::lab::reference::oracle::{RowOrder, ScalarSweep};
+use simpulse::lab::reference::{DPair, ProblemBody, Velocity};
 
 /// Uncorrected overlap (m), push speed limit (m/s), largest correction of a position sweep (m).
 const SLOP: f64 = 0.005;
@@ -30,16 +33,16 @@ impl Run {
     }
 
     /// The same; zero if the solver has no such parameter.
-    pub(super) fn get(&self, name: &str) -> f64 {
+    pub fn get(&self, name: &str) -> f64 {
         self.find(name).unwrap_or(0.0)
     }
 
     /// Whether departure `place` is undone.
-    pub(super) fn undoes(&self, place: usize) -> bool {
+    pub fn undoes(&self, place: usize) -> bool {
         self.undo == Some(place)
     }
 
-    pub(super) fn baumgarte(&self) -> ScalarRule {
+    pub fn baumgarte(&self) -> ScalarRule {
         ScalarRule::Baumgarte(self.get("baumgarte"), SLOP, CAP)
     }
 
@@ -68,23 +71,75 @@ fn substeps(
 }
 
 /// Velocity sweeps only.
-fn sweeps(model: &mut Model, run: &Run, sweep: ScalarSweep) {
+fn sweeps(model: &mut Model, run: &Run, sweep: ScalarSweep<ScalarRule>) {
     substeps(model, run, false, |m| m.sweep(&sweep), |_| ());
 }
 
 /// Velocity sweeps and, after motion, relaxing sweeps.
-fn relaxed(model: &mut Model, run: &Run, sweep: ScalarSweep, relax: ScalarSweep) {
+fn relaxed(model: &mut Model, run: &Run, sweep: ScalarSweep<ScalarRule>, relax: ScalarSweep<ScalarRule>) {
     let after = |m: &mut Model| (0..run.budget.relax_iterations).for_each(|_| m.sweep(&relax));
     substeps(model, run, sweep.turned, |m| m.sweep(&sweep), after);
 }
 
 /// Velocity sweeps and, after motion, position sweeps.
-fn placed(model: &mut Model, run: &Run, sweep: ScalarSweep, position: impl Fn(&mut Model)) {
+fn placed(model: &mut Model, run: &Run, sweep: ScalarSweep<ScalarRule>, position: impl Fn(&mut Model)) {
     let after = |m: &mut Model| (0..run.budget.position_iterations).for_each(|_| position(m));
     substeps(model, run, sweep.turned, |m| m.sweep(&sweep), after);
 }
 
-pub(super) fn pgs(model: &mut Model, run: &Run) {
+/// The reference of a comparison.
+#[derive(Clone, Copy)]
+pub enum Against {
+    /// The source's method in `f64`, state by state: after each iteration or substep.
+    Method(fn(&mut Model, &Run)),
+    /// The solution of the solver's law, compared after many iterations.
+    Solution(fn(&mut Model, &Run)),
+}
+
+/// The reference of this solver.
+pub fn against(solver: &str) -> Option<Against> {
+    use Against::{Method, Solution};
+    Some(match solver {
+        "projection" => Method(projection),
+        "pgs" => Method(pgs),
+        "pgs_ngs" => Method(pgs_ngs),
+        "pgs_ngs_block" => Method(pgs_ngs_block),
+        "pgs_soft" => Method(|m, r| soft(m, r, 1.0 / 3.0, false)),
+        "pgs_substeps" => Method(pgs_substeps),
+        "symmetric_gs" => Method(symmetric),
+        "sor" => Method(sor),
+        "local_gs" => Method(local),
+        "nsgs" => Method(|m, r| {
+            sweeps(m, r, ScalarSweep { rows: RowOrder::Cone, ..ScalarSweep::new(r.baumgarte()) })
+        }),
+        "nncg" => Method(vectors::nncg),
+        "anderson" => Method(vectors::anderson),
+        "apgd" => Method(vectors::apgd),
+        "barzilai_borwein" => Solution(vectors::apgd),
+        "random_order" | "staggered" | "admm" | "direct" | "two_level" => Solution(solution),
+        "sap" => Solution(vectors::sap),
+        "shock" => Method(shock),
+        "split_impulse" => Method(split_impulse),
+        "jacobi" => Method(|m, r| all_at_once(m, r, false)),
+        "mass_splitting" => Method(|m, r| all_at_once(m, r, true)),
+        "tgs_ngs" => Method(tgs_ngs),
+        "tgs_soft" => Method(|m, r| soft(m, r, 0.125, true)),
+        "tgs_sticky" => Method(tgs_sticky),
+        "xpbd" => Method(xpbd),
+        "avbd" => Method(avbd),
+        "soft_step" => Method(|m, r| soft(m, r, 0.125, false)),
+        "shim" => Method(shim),
+        "box2d" => Method(|m, r| without_first_friction(m, r, RowOrder::NormalsFirst)),
+        "rapier" => Method(|m, r| {
+            without_first_friction(m, r, RowOrder::BlockFirst(if r.undoes(0) { 1e-2 } else { 1e-3 }))
+        }),
+        "physx" => Method(physx),
+        "jolt" => Method(jolt),
+        _ => return None,
+    })
+}
+
+fn pgs(model: &mut Model, run: &Run) {
     let mut sweep = ScalarSweep::new(run.baumgarte());
     match run.undo {
         Some(0) => sweep.rows = RowOrder::PointByPoint,
@@ -96,34 +151,21 @@ pub(super) fn pgs(model: &mut Model, run: &Run) {
 }
 
 /// Its source displaces bodies, as [`xpbd`] does.
-pub(super) fn pgs_substeps(model: &mut Model, run: &Run) {
-    match run.undo {
-        Some(_) => xpbd(
-            model,
-            &Run {
-                variant: &positions::SOLVER,
-                undo: None,
-                budget: Budget { position_iterations: 1, ..run.budget },
-            },
-        ),
-        None => pgs(model, run),
+fn pgs_substeps(model: &mut Model, run: &Run) {
+    if run.undo.is_none() {
+        return pgs(model, run);
     }
+    let budget = Budget { position_iterations: 1, ..run.budget };
+    xpbd(model, &Run { variant: &displacements::SOLVER, undo: None, budget });
 }
 
-pub(super) fn sor(model: &mut Model, run: &Run) {
+fn sor(model: &mut Model, run: &Run) {
     let rows = if run.undoes(0) { RowOrder::PointByPoint } else { RowOrder::NormalsFirst };
-    sweeps(
-        model,
-        run,
-        ScalarSweep { relax: run.get("relaxation"), rows, ..ScalarSweep::new(run.baumgarte()) },
-    );
+    let sweep = ScalarSweep { relax: run.get("relaxation"), rows, ..ScalarSweep::new(run.baumgarte()) };
+    sweeps(model, run, sweep);
 }
 
-pub(super) fn nsgs(model: &mut Model, run: &Run) {
-    sweeps(model, run, ScalarSweep { rows: RowOrder::Cone, ..ScalarSweep::new(run.baumgarte()) });
-}
-
-pub(super) fn symmetric(model: &mut Model, run: &Run) {
+fn symmetric(model: &mut Model, run: &Run) {
     let sweep = ScalarSweep::new(run.baumgarte());
     let back = ScalarSweep { reversed: run.undoes(0), ..sweep };
     let pair = |m: &mut Model| {
@@ -133,7 +175,7 @@ pub(super) fn symmetric(model: &mut Model, run: &Run) {
     substeps(model, run, false, pair, |_| ());
 }
 
-pub(super) fn local(model: &mut Model, run: &Run) {
+fn local(model: &mut Model, run: &Run) {
     let times = if run.undoes(0) { 1000 } else { run.get("local_iterations") as usize };
     let sweep = ScalarSweep::new(run.baumgarte());
     let solve = |m: &mut Model| {
@@ -160,7 +202,7 @@ fn levels(model: &Model) -> Vec<usize> {
     level
 }
 
-pub(super) fn shock(model: &mut Model, run: &Run) {
+fn shock(model: &mut Model, run: &Run) {
     let level = levels(model);
     let of = |m: &std::ops::Range<usize>| {
         let sides = model.problem.contacts[m.start].sides();
@@ -186,18 +228,11 @@ pub(super) fn shock(model: &mut Model, run: &Run) {
     }
 }
 
-pub(super) fn jacobi(model: &mut Model, run: &Run) {
+/// Jacobi. `split`: on bodies that are split among their contacts.
+fn all_at_once(model: &mut Model, run: &Run, split: bool) {
+    let (by_rows, relax) = (split && run.undoes(0), run.find("relaxation").unwrap_or(1.0));
     let mut spring = run.spring(1.0 / 3.0, model.h);
-    spring.scaled = !run.undoes(0);
-    all_at_once(model, run, spring, false, false);
-}
-
-pub(super) fn mass_splitting(model: &mut Model, run: &Run) {
-    all_at_once(model, run, run.spring(1.0 / 3.0, model.h), true, run.undoes(0));
-}
-
-fn all_at_once(model: &mut Model, run: &Run, spring: ScalarSpring, split: bool, by_rows: bool) {
-    let relax = run.find("relaxation").unwrap_or(1.0);
+    spring.scaled = split || !run.undoes(0);
     let [soft, rigid] = [ScalarRule::Soft(spring), ScalarRule::Rigid]
         .map(|rule| ScalarSweep { relax, ..ScalarSweep::new(rule) });
     let after =
@@ -205,28 +240,28 @@ fn all_at_once(model: &mut Model, run: &Run, spring: ScalarSpring, split: bool, 
     substeps(model, run, false, |m| m.jacobi(&soft, split, by_rows), after);
 }
 
-pub(super) fn pgs_ngs(model: &mut Model, run: &Run) {
+fn pgs_ngs(model: &mut Model, run: &Run) {
     let mut sweep = ScalarSweep::new(if run.undoes(1) { ScalarRule::Closed } else { ScalarRule::Rigid });
     if run.undoes(0) {
         sweep.rows = RowOrder::FrictionFirst;
     }
-    placed(model, run, sweep, |m| m.positions(run.get("correction"), SLOP, MOST, true));
+    placed(model, run, sweep, |m| positions(m, run.get("correction"), SLOP, MOST, true));
 }
 
-pub(super) fn pgs_ngs_block(model: &mut Model, run: &Run) {
+fn pgs_ngs_block(model: &mut Model, run: &Run) {
     let rule = if run.undoes(0) { ScalarRule::Closed } else { ScalarRule::Rigid };
     placed(model, run, ScalarSweep { rows: RowOrder::BlockLast(1e-3), ..ScalarSweep::new(rule) }, |m| {
         if run.undoes(1) {
-            m.positions_in_pairs(run.get("correction"), SLOP, MOST);
+            positions_in_pairs(m, run.get("correction"), SLOP, MOST);
         } else {
-            m.positions(run.get("correction"), SLOP, MOST, true);
+            positions(m, run.get("correction"), SLOP, MOST, true);
         }
     });
 }
 
-pub(super) fn tgs_ngs(model: &mut Model, run: &Run) {
+fn tgs_ngs(model: &mut Model, run: &Run) {
     let sweep = ScalarSweep { turned: run.undoes(0), ..ScalarSweep::new(ScalarRule::Rigid) };
-    placed(model, run, sweep, |m| m.positions(run.get("correction"), SLOP, MOST, true));
+    placed(model, run, sweep, |m| positions(m, run.get("correction"), SLOP, MOST, true));
 }
 
 /// Soft sweeps, then rigid relaxing sweeps. `share`: largest spring frequency, as a fraction of the substep
@@ -242,36 +277,15 @@ fn soft(model: &mut Model, run: &Run, share: f64, turned: bool) {
     relaxed(model, run, soft, rigid);
 }
 
-pub(super) fn pgs_soft(model: &mut Model, run: &Run) {
-    soft(model, run, 1.0 / 3.0, false);
-}
-
-pub(super) fn soft_step(model: &mut Model, run: &Run) {
-    soft(model, run, 0.125, false);
-}
-
-pub(super) fn tgs_soft(model: &mut Model, run: &Run) {
-    soft(model, run, 0.125, true);
-}
-
-pub(super) fn box2d(model: &mut Model, run: &Run) {
-    let soft =
-        ScalarSweep { friction: false, ..ScalarSweep::new(ScalarRule::Soft(run.spring(0.125, model.h))) };
-    relaxed(model, run, soft, ScalarSweep::new(ScalarRule::Rigid));
-}
-
-pub(super) fn rapier(model: &mut Model, run: &Run) {
-    let rows = RowOrder::BlockFirst(if run.undoes(0) { 1e-2 } else { 1e-3 });
-    let soft = ScalarSweep {
-        friction: false,
-        rows,
-        ..ScalarSweep::new(ScalarRule::Soft(run.spring(0.125, model.h)))
-    };
+/// Soft sweeps without friction, then rigid ones with it.
+fn without_first_friction(model: &mut Model, run: &Run, rows: RowOrder) {
+    let spring = ScalarRule::Soft(run.spring(0.125, model.h));
+    let soft = ScalarSweep { friction: false, rows, ..ScalarSweep::new(spring) };
     relaxed(model, run, soft, ScalarSweep { rows, ..ScalarSweep::new(ScalarRule::Rigid) });
 }
 
 /// `shim` without its statics, frames, impacts and jams.
-pub(super) fn shim(model: &mut Model, run: &Run) {
+fn shim(model: &mut Model, run: &Run) {
     let rate = run.get("stiffness") / model.h;
     let spring = ScalarSpring {
         carries: true,
@@ -282,18 +296,18 @@ pub(super) fn shim(model: &mut Model, run: &Run) {
     relaxed(model, run, soft, rigid);
 }
 
-pub(super) fn projection(model: &mut Model, run: &Run) {
+fn projection(model: &mut Model, run: &Run) {
     let touching = ScalarSweep { friction: false, ..ScalarSweep::new(ScalarRule::Touching(SLOP)) };
     for _ in 0..run.budget.substeps {
         model.l.fill([0.0; 2]);
         model.accelerate();
         model.advance();
-        (0..run.budget.position_iterations).for_each(|_| model.positions(1.0, 0.0, MOST, false));
+        (0..run.budget.position_iterations).for_each(|_| positions(model, 1.0, 0.0, MOST, false));
         (0..run.budget.velocity_iterations).for_each(|_| model.sweep(&touching));
     }
 }
 
-pub(super) fn split_impulse(model: &mut Model, run: &Run) {
+fn split_impulse(model: &mut Model, run: &Run) {
     let share = run.get("correction");
     let (rigid, push) = match run.undoes(0) {
         true => (ScalarRule::Shallow(share, 0.04), ScalarRule::Deep(share, 0.04)),
@@ -316,7 +330,7 @@ pub(super) fn split_impulse(model: &mut Model, run: &Run) {
     );
 }
 
-pub(super) fn tgs_sticky(model: &mut Model, run: &Run) {
+fn tgs_sticky(model: &mut Model, run: &Run) {
     let points = model.l.len();
     let mut drifts = vec![0.0; points];
     model.l.fill([0.0; 2]);
@@ -356,7 +370,7 @@ pub(super) fn tgs_sticky(model: &mut Model, run: &Run) {
     }
 }
 
-pub(super) fn physx(model: &mut Model, run: &Run) {
+fn physx(model: &mut Model, run: &Run) {
     let substeps = run.budget.substeps;
     let fraction = run.get("baumgarte").min(2.0 / f64::from(substeps).sqrt());
     model.l.fill([0.0; 2]);
@@ -395,7 +409,7 @@ pub(super) fn physx(model: &mut Model, run: &Run) {
     (0..run.budget.relax_iterations).for_each(|_| sweep(model, true));
 }
 
-pub(super) fn jolt(model: &mut Model, run: &Run) {
+fn jolt(model: &mut Model, run: &Run) {
     let normals = ScalarSweep { friction: false, ..ScalarSweep::new(ScalarRule::Rigid) };
     let sweep = |m: &mut Model| {
         for range in m.manifolds.clone() {
@@ -403,11 +417,11 @@ pub(super) fn jolt(model: &mut Model, run: &Run) {
             let share = 1.0 / range.len() as f64;
             let mut rows = m.rows(range.start, false);
             for i in range.start + 1..range.end {
-                for ((_, mean), (_, j)) in rows.iter_mut().zip(m.rows(i, false)) {
+                for ((_, mean), (_, j)) in rows.iter_mut().flatten().zip(m.rows(i, false).iter().flatten()) {
                     mean[1][2] += j[1][2];
                 }
             }
-            rows.iter_mut().for_each(|(_, mean)| mean[1][2] *= share);
+            rows.iter_mut().flatten().for_each(|(_, mean)| mean[1][2] *= share);
             let sum = |axis: usize| range.clone().map(|i| m.l[i][axis]).sum::<f64>();
             let (bound, old) = (m.problem.contacts[range.start].friction * sum(0), sum(1));
             let new = (old - m.mass(&rows, 1) * m.speed(&rows, 1)).clamp(-bound, bound);
@@ -418,12 +432,12 @@ pub(super) fn jolt(model: &mut Model, run: &Run) {
     };
     let (share, slop) = (run.get("correction"), run.get("slop"));
     let after = |m: &mut Model| {
-        (0..run.budget.position_iterations).for_each(|_| m.positions(share, slop, share * MOST, true));
+        (0..run.budget.position_iterations).for_each(|_| positions(m, share, slop, share * MOST, true));
     };
     substeps(model, run, false, sweep, after);
 }
 
-pub(super) fn xpbd(model: &mut Model, run: &Run) {
+fn xpbd(model: &mut Model, run: &Run) {
     let compliance = run.get("compliance") / (model.h * model.h);
     for _ in 0..run.budget.substeps {
         model.accelerate();
@@ -480,8 +494,10 @@ fn bodies_in_order(model: &Model) -> Vec<usize> {
 }
 
 /// Starts with zero multipliers and penalties of 1 N/m, as in a first step.
-pub(super) fn avbd(model: &mut Model, run: &Run) {
+fn avbd(model: &mut Model, run: &Run) {
     let (h, points, order) = (model.h, model.l.len(), bodies_in_order(model));
+    let forced = |b: &ProblemBody| [0, 1, 2].map(|k| b.free_velocity[k] - b.velocity[k]);
+    let gained: Vec<Velocity> = model.problem.bodies.iter().map(forced).collect();
     let stabilizes = run.budget.position_iterations > 0;
     let (margin, alpha) = (5e-4, if stabilizes { 1.0 } else { run.get("alpha") });
     let keep = if stabilizes { 1.0 } else { run.get("alpha") * run.get("gamma") };
@@ -496,7 +512,7 @@ pub(super) fn avbd(model: &mut Model, run: &Run) {
         // substep.
         let linear = |m: &Model, i: usize| {
             let mut c = [m.problem.contacts[i].gap + margin, 0.0];
-            for (b, j) in m.rows(i, false) {
+            for (b, j) in m.rows(i, false).into_iter().flatten() {
                 (0..2).for_each(|axis| (0..3).for_each(|k| c[axis] += j[axis][k] * m.x[b][k]));
             }
             c
@@ -504,7 +520,7 @@ pub(super) fn avbd(model: &mut Model, run: &Run) {
         let first: Vec<DPair> = (0..points).map(|i| linear(model, i)).collect();
         let share: Vec<f64> = (0..model.v.len())
             .map(|b| {
-                let (v, a) = (model.v[b], model.gained[b]);
+                let (v, a) = (model.v[b], gained[b]);
                 let square = a[0] * a[0] + a[1] * a[1];
                 let along = (v[0] - last[b][0]) * a[0] + (v[1] - last[b][1]) * a[1];
                 if square > 0.0 { (along / square).clamp(0.0, 1.0) } else { 1.0 }
@@ -515,7 +531,7 @@ pub(super) fn avbd(model: &mut Model, run: &Run) {
         model.advance();
         let inertial = model.x.clone();
         for &b in &order {
-            (0..3).for_each(|c| model.x[b][c] -= (1.0 - share[b]) * h * model.gained[b][c]);
+            (0..3).for_each(|c| model.x[b][c] -= (1.0 - share[b]) * h * gained[b][c]);
         }
         let forces = |m: &Model, i: usize, alpha: f64, l: &[DPair], k: &[DPair]| {
             let c = linear(m, i);
@@ -539,7 +555,8 @@ pub(super) fn avbd(model: &mut Model, run: &Run) {
                     };
                 }
                 for i in 0..points {
-                    let Some((_, j)) = m.rows(i, false).into_iter().find(|(b, _)| *b == body) else {
+                    let Some((_, j)) = m.rows(i, false).into_iter().flatten().find(|(b, _)| *b == body)
+                    else {
                         continue;
                     };
                     let (_, force, _) = forces(m, i, alpha, l, k);
@@ -553,8 +570,8 @@ pub(super) fn avbd(model: &mut Model, run: &Run) {
                         }
                     }
                 }
-                let change = solve3(a, f);
-                (0..3).for_each(|c| m.x[body][c] += change[c]);
+                solve_in_place(a.as_flattened_mut(), &mut f, 0.0);
+                (0..3).for_each(|c| m.x[body][c] += f[c]);
             }
         };
         for _ in 0..run.budget.velocity_iterations {
@@ -577,21 +594,8 @@ pub(super) fn avbd(model: &mut Model, run: &Run) {
     }
 }
 
-/// A x = f by Cramer's rule.
-fn solve3(a: [[f64; 3]; 3], f: [f64; 3]) -> [f64; 3] {
-    let det = |m: [[f64; 3]; 3]| {
-        let minor = |p: usize, q: usize| m[1][p] * m[2][q] - m[1][q] * m[2][p];
-        m[0][0] * minor(1, 2) - m[0][1] * minor(0, 2) + m[0][2] * minor(0, 1)
-    };
-    [0, 1, 2].map(|column| {
-        let mut m = a;
-        (0..3).for_each(|r| m[r][column] = f[r]);
-        det(m) / det(a)
-    })
-}
-
 /// The solution of the law of [`pgs`], to which Gauss–Seidel converges.
-pub(super) fn solution(model: &mut Model, run: &Run) {
+fn solution(model: &mut Model, run: &Run) {
     let budget = Budget { velocity_iterations: 5000, ..run.budget };
     pgs(model, &Run { budget, undo: None, ..*run });
 }
