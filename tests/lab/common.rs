@@ -1,10 +1,11 @@
 //! Helpers shared by several test files.
 #![allow(dead_code)]
 
+use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::Variant;
 use simpulse::engine::world::{Settings, World};
-use simpulse::lab::scenes::{self, Scene};
+use simpulse::lab::scenes::{self, Scene, SceneBody, SceneShape};
 
 /// Standard settings of a solver.
 pub fn settings(variant: &'static Variant) -> Settings {
@@ -22,17 +23,14 @@ pub fn scene(name: &str) -> Scene {
     if name != "crowded_plate" {
         return scenes::load(name).unwrap().scene;
     }
-    let mut bodies = String::from(
-        r#"{"type":"kinematic","position":[0,-1],"velocity":[0.3,0],"shapes":[{"box":{"half":[60,1]}}]},
-           {"type":"dynamic","position":[0,0.5],"shapes":[{"box":{"half":[50,0.5]}}]}"#,
-    );
-    for i in 0..90 {
-        let shape = if i % 3 == 0 { r#"{"circle":{"radius":0.4}}"# } else { r#"{"box":{"half":[0.4,0.4]}}"# };
-        let x = i as f64 - 44.5;
-        bodies += &format!(r#",{{"type":"dynamic","position":[{x},1.41],"shapes":[{shape}]}}"#);
-    }
-    let text = format!(r#"{{"name":"crowded_plate","bodies":[{bodies}]}}"#);
-    Scene::from_json(&text, "crowded_plate.json".as_ref()).unwrap()
+    let boxed = |x, y| SceneShape::rectangle(x, y);
+    let belt = SceneBody::new(BodyKind::Kinematic, [0.0, -1.0], boxed(60.0, 1.0)).moving([0.3, 0.0], 0.0);
+    let mut bodies = vec![belt, SceneBody::dynamic([0.0, 0.5], boxed(50.0, 0.5))];
+    bodies.extend((0..90).map(|i| {
+        let shape = if i % 3 == 0 { SceneShape::disc(0.4) } else { boxed(0.4, 0.4) };
+        SceneBody::dynamic([f64::from(i) - 44.5, 1.41], shape)
+    }));
+    Scene::new(name, bodies)
 }
 
 /// Steps a scene; panics if it diverges.

@@ -12,11 +12,15 @@ fn scene(name: &str) -> World {
     common::scene(name).build(common::settings(solvers::find("shim").unwrap())).unwrap()
 }
 
-/// These bodies, each preceded by a comma, on the ground.
-fn on_ground(bodies: &str) -> Scene {
-    let ground = r#"{"type":"static","position":[0,-1],"shapes":[{"box":{"half":[60,1]}}]}"#;
-    Scene::from_json(&format!(r#"{{"name":"piles","bodies":[{ground}{bodies}]}}"#), "piles.json".as_ref())
-        .unwrap()
+/// These bodies on the ground.
+fn on_ground(bodies: Vec<SceneBody>) -> Scene {
+    let ground = SceneBody::fixed([0.0, -1.0], SceneShape::rectangle(60.0, 1.0));
+    Scene::new("piles", std::iter::once(ground).chain(bodies).collect())
+}
+
+/// The scene after these steps.
+fn stepped(scene: &Scene, steps: u32) -> World {
+    common::run(scene, common::settings(solvers::find("shim").unwrap()), steps)
 }
 
 /// Ten tables on top of each other, each on two legs, come to rest within ten seconds.
@@ -24,18 +28,11 @@ fn on_ground(bodies: &str) -> Scene {
 fn tables_on_tables_rest() {
     let table = |i: u32| {
         let y = 1.5 * f64::from(i);
-        let part = |x: f64, y: f64, half: [f64; 2]| {
-            format!(r#",{{"type":"dynamic","position":[{x},{y}],"shapes":[{{"box":{{"half":{half:?}}}}}]}}"#)
-        };
-        let legs = [-1.5, 1.5].map(|x| part(x, y + 0.5, [0.2, 0.5]));
-        legs.concat() + &part(0.0, y + 1.25, [2.0, 0.25])
+        let part = |x, y, [w, h]: [f64; 2]| SceneBody::dynamic([x, y], SceneShape::rectangle(w, h));
+        let leg = |x| part(x, y + 0.5, [0.2, 0.5]);
+        [leg(-1.5), leg(1.5), part(0.0, y + 1.25, [2.0, 0.25])]
     };
-    let scene = on_ground(&(0..10).map(table).collect::<String>());
-    let mut world = scene.build(common::settings(solvers::find("shim").unwrap())).unwrap();
-    for _ in 0..600 {
-        world.step().unwrap();
-    }
-    let fastest = common::fastest(&world);
+    let fastest = common::fastest(&stepped(&on_ground((0..10).flat_map(table).collect()), 600));
     assert!(fastest < 1e-3, "{fastest}");
 }
 
@@ -52,7 +49,6 @@ fn moved(name: &str, by: f64) -> Vec<SceneBody> {
 /// other colors, and so another order of contacts, cause within a second.
 #[test]
 fn a_pile_knows_nothing_of_another() {
-    let settings = || common::settings(solvers::find("shim").unwrap());
     let falling = |x: f64| {
         (0..40).map(move |i| {
             SceneBody::dynamic([x + 1.2 * f64::from(i), 4.0], SceneShape::rectangle(0.5, 0.5))
@@ -64,13 +60,7 @@ fn a_pile_knows_nothing_of_another() {
     both.extend(moved("stack:40", 200.0));
     both.extend(falling(300.0));
     both.push(SceneBody::fixed([320.0, -1.0], SceneShape::rectangle(60.0, 1.0)));
-    let run = |bodies: Vec<SceneBody>| {
-        let mut world = Scene::new("piles", bodies).build(settings()).unwrap();
-        for _ in 0..60 {
-            world.step().unwrap();
-        }
-        world
-    };
+    let run = |bodies: Vec<SceneBody>| stepped(&Scene::new("piles", bodies), 60);
     let (one, two) = (run(alone.clone()), run(both));
     for body in 0..alone.len() {
         let [p, q] = [&one, &two].map(|world| world.bodies.pose(body).position);
@@ -119,16 +109,11 @@ fn an_arch_begins_with_its_thrust() {
 #[test]
 fn columns_bear_boxes_of_a_hundred_and_nine_hundred_times_the_mass() {
     for (count, density) in [(10, 100.0), (20, 900.0)] {
-        let boxed = |i: u32, density: f64| {
-            let y = 0.5 + f64::from(i);
-            let shape = format!(r#"{{"box":{{"half":[0.5,0.5]}},"density":{density}}}"#);
-            format!(r#",{{"type":"dynamic","position":[0,{y}],"shapes":[{shape}]}}"#)
+        let boxed = |i: u32| {
+            let shape = SceneShape::rectangle(0.5, 0.5).density(if i == count { density } else { 1.0 });
+            SceneBody::dynamic([0.0, 0.5 + f64::from(i)], shape)
         };
-        let bodies = (0..count).map(|i| boxed(i, 1.0)).collect::<String>() + &boxed(count, density);
-        let mut world = on_ground(&bodies).build(common::settings(solvers::find("shim").unwrap())).unwrap();
-        for _ in 0..3600 {
-            world.step().unwrap();
-        }
+        let world = stepped(&on_ground((0..=count).map(boxed).collect()), 3600);
         let heavy = world.bodies.len() - 1;
         let sunk = 0.5 + f64::from(count) - f64::from(world.bodies.position_y[heavy]);
         println!(
@@ -286,13 +271,7 @@ fn a_little_restitution_is_none() {
             let shape = SceneShape::rectangle(0.5, 0.5).restitution(e);
             SceneBody::dynamic([0.02 * f64::from(i % 3), 0.6 + 1.2 * f64::from(i)], shape)
         };
-        let mut scene = on_ground("");
-        scene.bodies.extend((0..10).map(boxed));
-        let mut world = scene.build(common::settings(solvers::find("shim").unwrap())).unwrap();
-        for _ in 0..180 {
-            world.step().unwrap();
-        }
-        world.state_hash()
+        stepped(&on_ground((0..10).map(boxed).collect()), 180).state_hash()
     };
     assert_eq!(fallen(0.0), fallen(1e-6));
 }

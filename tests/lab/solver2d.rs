@@ -4,7 +4,7 @@
 use simpulse::engine::solvers::find;
 use simpulse::engine::world::{Order, World};
 use simpulse::lab::metrics::Observation;
-use simpulse::lab::scenes::Scene;
+use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 use std::path::Path;
 
 /// Solver2D's name, our name, the budget for n primary and 2 extra iterations (substeps, velocity, relaxing
@@ -53,21 +53,13 @@ fn published(scene: &str, solver: &str, n: u32) -> Figures {
 
 /// The scene, and the intended positions of its bodies (m).
 fn scene(name: &str) -> (Scene, Vec<[f64; 2]>) {
-    let boxes = |at: &[[f64; 2]], half: f64, density: f64, friction: f64| {
-        let body = |[x, y]: &[f64; 2]| {
-            format!(
-                r#",{{"type":"dynamic","position":[{x},{y}],
-                "shapes":[{{"box":{{"half":[{half},{half}]}},"density":{density},"friction":{friction}}}]}}"#
-            )
-        };
-        at.iter().map(body).collect::<String>()
+    let boxes = |at: &[[f64; 2]], half: f64, density: f64, friction: f64| -> Vec<SceneBody> {
+        let shape = || SceneShape::rectangle(half, half).density(density).friction(friction);
+        at.iter().map(|at| SceneBody::dynamic(*at, shape())).collect()
     };
-    let on_ground = |bodies: String| {
-        let text = format!(
-            r#"{{"name":"scene","bodies":[{{"type":"static","position":[0,-1],
-            "shapes":[{{"box":{{"half":[100,1]}}}}]}}{bodies}]}}"#
-        );
-        Scene::from_json(&text, "scene.json".as_ref()).unwrap()
+    let on_ground = |bodies: [Vec<SceneBody>; 2]| {
+        let ground = SceneBody::fixed([0.0, -1.0], SceneShape::rectangle(100.0, 1.0));
+        Scene::new("scene", [vec![ground], bodies.concat()].concat())
     };
     let column: Vec<[f64; 2]> = (0..15).map(|i| [0.0, f64::from(i) + 0.5]).collect();
     let sway = |i: usize| if i.is_multiple_of(2) { -0.01 } else { 0.01 };
@@ -79,12 +71,13 @@ fn scene(name: &str) -> (Scene, Vec<[f64; 2]>) {
         "stack15" => {
             let dropped: Vec<_> = (0..15).map(|i| [sway(i), 0.55 + 1.1 * i as f64]).collect();
             let place = [vec![[0.0, -1.0]], column].concat();
-            return (on_ground(boxes(&dropped, 0.5, 1.0, 0.3)), place);
+            return (on_ground([boxes(&dropped, 0.5, 1.0, 0.3), vec![]]), place);
         }
-        "heavy_on_small_400:1" => on_ground(
-            boxes(&[[-9.0, 0.5], [9.0, 0.5]], 0.5, 1.0, 0.6) + &boxes(&[[0.0, 11.0]], 10.0, 1.0, 0.6),
-        ),
-        _ => on_ground(boxes(&column[..9], 0.5, 1.0, 0.6) + &boxes(&[column[9]], 0.5, 100.0, 0.6)),
+        "heavy_on_small_400:1" => on_ground([
+            boxes(&[[-9.0, 0.5], [9.0, 0.5]], 0.5, 1.0, 0.6),
+            boxes(&[[0.0, 11.0]], 10.0, 1.0, 0.6),
+        ]),
+        _ => on_ground([boxes(&column[..9], 0.5, 1.0, 0.6), boxes(&[column[9]], 0.5, 100.0, 0.6)]),
     };
     let place = scene.bodies.iter().map(|body| body.position).collect();
     (scene, place)

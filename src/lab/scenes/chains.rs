@@ -10,19 +10,22 @@ use crate::engine::joints::{JointKind, Weld};
 /// Limit on the gap of joints of 1 m links (m).
 const GAP: (f64, &str) = (0.005, "half a percent of a link of 1 m starts to be visible");
 
+/// Hinges of `count` links that hang from body 0: at `before` of the link before (the center of body 0) and at
+/// `own` of the link itself (m).
+fn hinges(count: usize, before: [f64; 2], own: [f64; 2]) -> Vec<SceneJoint> {
+    let anchor = |i| if i == 0 { [0.0, 0.0] } else { before };
+    (0..count).map(|i| SceneJoint::revolute(i, i + 1, anchor(i), own)).collect()
+}
+
 /// Solver2D's bridge: 160 m of links over 160 m. Any sag opens gaps; without gaps the tension would be
 /// infinite.
 pub(super) const BRIDGE: Entry =
     Entry::new("bridge", "160 planks between two points at their distance", |_| {
+        let plank = || SceneShape::rectangle(0.5, 0.125).density(20.0);
         let mut bodies = vec![pin([-80.0, 20.0])];
-        let mut joints = vec![];
-        for i in 0..160 {
-            let plank = SceneShape::rectangle(0.5, 0.125).density(20.0);
-            bodies.push(damped(SceneBody::dynamic([f64::from(i) - 79.5, 20.0], plank)));
-            let (before, anchor) = if i == 0 { (0, [0.0, 0.0]) } else { (i as usize, [0.5, 0.0]) };
-            joints.push(SceneJoint::revolute(before, i as usize + 1, anchor, [-0.5, 0.0]));
-        }
+        bodies.extend((0..160).map(|i| damped(SceneBody::dynamic([f64::from(i) - 79.5, 20.0], plank()))));
         bodies.push(pin([80.0, 20.0]));
+        let mut joints = hinges(160, [0.5, 0.0], [-0.5, 0.0]);
         joints.push(SceneJoint::revolute(160, 161, [0.5, 0.0], [0.0, 0.0]));
         Scene::new("bridge", bodies).joined(joints).steps(600)
     })
@@ -33,14 +36,10 @@ pub(super) const BRIDGE: Entry =
 /// Solver2D's ball and chain: the ball weighs 672 links.
 pub(super) const BALL: Entry =
     Entry::new("ball_and_chain", "a ball on a chain of 40 links, 672 times as heavy as one", |_| {
+        let shape = || link(0.5, 0.125).density(20.0);
         let mut bodies = vec![pin([0.0, 20.0])];
-        let mut joints = vec![];
-        for i in 0..40 {
-            let shape = link(0.5, 0.125).density(20.0);
-            bodies.push(damped(SceneBody::dynamic([f64::from(i) + 0.5, 20.0], shape)));
-            let anchor = if i == 0 { [0.0, 0.0] } else { [0.5, 0.0] };
-            joints.push(SceneJoint::revolute(i as usize, i as usize + 1, anchor, [-0.5, 0.0]));
-        }
+        bodies.extend((0..40).map(|i| damped(SceneBody::dynamic([f64::from(i) + 0.5, 20.0], shape()))));
+        let mut joints = hinges(40, [0.5, 0.0], [-0.5, 0.0]);
         bodies.push(damped(SceneBody::dynamic([48.0, 20.0], SceneShape::disc(8.0).density(20.0))));
         joints.push(SceneJoint::revolute(40, 41, [0.5, 0.0], [-8.0, 0.0]));
         Scene::new("ball_and_chain", bodies).joined(joints).steps(1200)
@@ -53,13 +52,11 @@ pub(super) const BALL: Entry =
 pub(super) const STRETCHED: Entry =
     Entry::new("stretched_chain", "40 discs on a vertical chain that starts at twice its length", |_| {
         let mut bodies = vec![pin([0.0, 39.5])];
-        let mut joints = vec![];
-        for i in 0..40 {
+        bodies.extend((0..40).map(|i| {
             let disc = SceneBody::dynamic([0.0, 38.0 - 2.0 * f64::from(i)], SceneShape::disc(0.2));
-            bodies.push(SceneBody { group: -1, ..disc });
-            let anchor = if i == 0 { [0.0, 0.0] } else { [0.0, -0.5] };
-            joints.push(SceneJoint::revolute(i as usize, i as usize + 1, anchor, [0.0, 0.5]));
-        }
+            SceneBody { group: -1, ..disc }
+        }));
+        let joints = hinges(40, [0.0, -0.5], [0.0, 0.5]);
         Scene::new("stretched_chain", bodies).joined(joints).steps(600)
     })
     // The lowest of 40 links of 1 m under 39.5 m.
@@ -70,14 +67,11 @@ pub(super) const STRETCHED: Entry =
 pub(super) const FAR: Entry =
     Entry::new("far_chain", "a chain of 40 links of 0.2 m, 53 km from the origin", |_| {
         let (x, y) = (4e4, -3.5e4 + 4.0);
+        let shape = || link(0.1, 0.025).density(20.0);
         let mut bodies = vec![SceneBody { group: -1, ..SceneBody::fixed([x, y], SceneShape::disc(0.02)) }];
-        let mut joints = vec![];
-        for i in 0..40 {
-            let shape = link(0.1, 0.025).density(20.0);
-            bodies.push(damped(SceneBody::dynamic([x + 0.2 * f64::from(i) + 0.1, y], shape)));
-            let anchor = if i == 0 { [0.0, 0.0] } else { [0.1, 0.0] };
-            joints.push(SceneJoint::revolute(i as usize, i as usize + 1, anchor, [-0.1, 0.0]));
-        }
+        bodies
+            .extend((0..40).map(|i| damped(SceneBody::dynamic([x + 0.2 * f64::from(i) + 0.1, y], shape()))));
+        let joints = hinges(40, [0.1, 0.0], [-0.1, 0.0]);
         Scene::new("far_chain", bodies).joined(joints).steps(600)
     })
     .known(|scene, _| gaps(scene, 0.2))

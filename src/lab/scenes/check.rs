@@ -43,42 +43,28 @@ impl Scene {
     }
 
     fn check_head(&self) -> Result<(), Error> {
-        if self.name.trim().is_empty() {
-            return Err(Error::invalid("name", format!("must not be empty, is '{}'", self.name)));
-        }
-        if self.name.chars().any(char::is_control) {
-            let message = format!("must not have control characters, is {:?}", self.name);
-            return Err(Error::invalid("name", message));
-        }
+        let name = &self.name;
+        require(!name.trim().is_empty(), "name", || format!("must not be empty, is '{name}'"))?;
+        let plain = !name.chars().any(char::is_control);
+        require(plain, "name", || format!("must not have control characters, is {name:?}"))?;
         finite_pair("gravity", self.gravity)?;
         positive("dt", self.dt)?;
-        if self.dt < MIN_DT {
-            return Err(Error::invalid("dt", format!("must be at least {MIN_DT:e} s, is {:e} s", self.dt)));
-        }
-        if self.dt > MAX_DT {
-            return Err(Error::invalid("dt", format!("must be at most {MAX_DT} s, is {:e} s", self.dt)));
-        }
-        if !LENGTH_UNITS.contains(&self.length_unit) {
+        let dt = self.dt;
+        require(dt >= MIN_DT, "dt", || format!("must be at least {MIN_DT:e} s, is {dt:e} s"))?;
+        require(dt <= MAX_DT, "dt", || format!("must be at most {MAX_DT} s, is {dt:e} s"))?;
+        require(LENGTH_UNITS.contains(&self.length_unit), "length_unit", || {
             let [least, most] = [LENGTH_UNITS.start(), LENGTH_UNITS.end()];
-            let message =
-                format!("must be at least {least:e} m and at most {most:e} m, is {:?} m", self.length_unit);
-            return Err(Error::invalid("length_unit", message));
-        }
-        if !(1..=MAX_STEPS).contains(&self.steps) {
-            let message = format!("must be at least 1 and at most {MAX_STEPS}, is {}", self.steps);
-            return Err(Error::invalid("steps", message));
-        }
-        if self.bodies.is_empty() {
-            return Err(Error::invalid("bodies", "there are none: a scene needs at least one"));
-        }
-        if self.bodies.len() > MAX_BODIES {
-            let message = format!("{} bodies, where at most {MAX_BODIES} are possible", self.bodies.len());
-            return Err(Error::invalid("bodies", message));
-        }
-        if let Some(expect) = &self.expect {
-            expect.validate(self).map_err(|e| e.within("expect"))?;
-        }
-        Ok(())
+            format!("must be at least {least:e} m and at most {most:e} m, is {:?} m", self.length_unit)
+        })?;
+        require((1..=MAX_STEPS).contains(&self.steps), "steps", || {
+            format!("must be at least 1 and at most {MAX_STEPS}, is {}", self.steps)
+        })?;
+        let count = self.bodies.len();
+        require(count > 0, "bodies", || "there are none: a scene needs at least one".to_string())?;
+        require(count <= MAX_BODIES, "bodies", || {
+            format!("{count} bodies, where at most {MAX_BODIES} are possible")
+        })?;
+        self.expect.as_ref().map_or(Ok(()), |expect| expect.validate(self).map_err(|e| e.within("expect")))
     }
 
     /// The bodies as definitions for a world. Errors: as [`Scene::validate`].
@@ -119,28 +105,23 @@ impl Scene {
     fn check_joints(&self) -> Result<(), Error> {
         for (i, joint) in self.joints.iter().enumerate() {
             let place = format!("joints[{i}].{}", joint.kind.name());
+            let (at_b, count) = (format!("{place}.b"), self.bodies.len());
             for (name, body) in [("a", joint.a), ("b", joint.b)] {
-                if body >= self.bodies.len() {
-                    let message = format!("there is no body {body} among {}", self.bodies.len());
-                    return Err(Error::invalid(format!("{place}.{name}"), message));
-                }
+                require(body < count, &format!("{place}.{name}"), || {
+                    format!("there is no body {body} among {count}")
+                })?;
             }
-            if joint.a == joint.b {
-                return Err(Error::invalid(
-                    format!("{place}.b"),
-                    format!("body {} has no joint to itself", joint.b),
-                ));
-            }
+            require(joint.a != joint.b, &at_b, || format!("body {} has no joint to itself", joint.b))?;
             let moves = |body: usize| self.bodies[body].kind == BodyKind::Dynamic;
-            if !moves(joint.a) && !moves(joint.b) && joint.kind != JointKind::Filter {
-                let message = format!("neither body {} nor body {} moves by forces", joint.a, joint.b);
-                return Err(Error::invalid(format!("{place}.b"), message));
-            }
+            require(moves(joint.a) || moves(joint.b) || joint.kind == JointKind::Filter, &at_b, || {
+                format!("neither body {} nor body {} moves by forces", joint.a, joint.b)
+            })?;
             for (k, load) in joint.break_load.into_iter().flatten().enumerate() {
-                if !(load as f32).is_finite() || load < 0.0 {
-                    let message = format!("must be finite in 32 bits and not negative, is {load:?}");
-                    return Err(Error::invalid(format!("{place}.break_load[{k}]"), message));
-                }
+                require(
+                    (load as f32).is_finite() && load >= 0.0,
+                    &format!("{place}.break_load[{k}]"),
+                    || format!("must be finite in 32 bits and not negative, is {load:?}"),
+                )?;
             }
             joint.kind.check().map_err(|e| Error::from(e.within(&format!("joints[{i}]"))))?;
         }
@@ -226,11 +207,13 @@ fn geometry(geometry: &Geometry) -> Result<Shape, Error> {
     Ok(shape)
 }
 
+/// The error of a value that is not as it must be.
+pub(super) fn require(holds: bool, place: &str, message: impl FnOnce() -> String) -> Result<(), Error> {
+    if holds { Ok(()) } else { Err(Error::invalid(place, message())) }
+}
+
 fn finite(place: &str, value: f64) -> Result<(), Error> {
-    if (value as f32).is_finite() {
-        return Ok(());
-    }
-    Err(Error::invalid(place, format!("must be finite in 32 bits, is {value:?}")))
+    require((value as f32).is_finite(), place, || format!("must be finite in 32 bits, is {value:?}"))
 }
 
 fn finite_pair(place: &str, value: [f64; 2]) -> Result<(), Error> {
@@ -240,8 +223,5 @@ fn finite_pair(place: &str, value: [f64; 2]) -> Result<(), Error> {
 fn positive(place: &str, value: f64) -> Result<(), Error> {
     finite(place, value)?;
     // A value too small for 32 bits becomes zero.
-    if value as f32 > 0.0 {
-        return Ok(());
-    }
-    Err(Error::invalid(place, format!("must be positive, is {value:?}")))
+    require(value as f32 > 0.0, place, || format!("must be positive, is {value:?}"))
 }

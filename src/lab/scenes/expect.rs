@@ -4,6 +4,7 @@
 //! that it came from. Observers of the catalog that no number describes (the twin of a far stack, the apexes
 //! of a bounce) are found by its name, as long as the bodies are unchanged.
 
+use super::check::require;
 use super::holds::Demand;
 use super::tolerance::Tolerances;
 use super::truth::{Truth, greatest_drop, load_on_ground, rests_at};
@@ -74,43 +75,36 @@ pub enum Measure {
 impl Expect {
     /// Rejects invalid expectations. Errors name places within `expect`.
     pub(super) fn validate(&self, scene: &Scene) -> Result<(), Error> {
-        let positive = |place: &str, value: f64| match value > 0.0 && (value as f32).is_finite() {
-            true => Ok(()),
-            false => Err(Error::invalid(place, format!("must be positive and finite, is {value}"))),
+        let positive = |place: &str, value: f64| {
+            let holds = value > 0.0 && (value as f32).is_finite();
+            require(holds, place, || format!("must be positive and finite, is {value}"))
         };
-        if let Some(limit) = self.stays_within {
-            positive("stays_within", limit)?;
-        }
-        if let Some([low, high]) = self.stays_inside
-            && !(0..2)
-                .all(|k| low[k] < high[k] && (low[k] as f32).is_finite() && (high[k] as f32).is_finite())
-        {
-            let message = format!("the first corner must be below and left of the second: {low:?}, {high:?}");
-            return Err(Error::invalid("stays_inside", message));
+        self.stays_within.map_or(Ok(()), |limit| positive("stays_within", limit))?;
+        if let Some([low, high]) = self.stays_inside {
+            let finite = |x: f64| (x as f32).is_finite();
+            let holds = (0..2).all(|k| low[k] < high[k] && finite(low[k]) && finite(high[k]));
+            require(holds, "stays_inside", || {
+                format!("the first corner must be below and left of the second: {low:?}, {high:?}")
+            })?;
         }
         let Some(KnownValue { measure, body, value, tolerance }) = &self.reference else { return Ok(()) };
         positive("reference.tolerance", *tolerance)?;
-        if !(*value as f32).is_finite() {
-            return Err(Error::invalid("reference.value", format!("must be finite, is {value}")));
-        }
+        let finite = (*value as f32).is_finite();
+        require(finite, "reference.value", || format!("must be finite, is {value}"))?;
         let is_dynamic = |i: &usize| scene.bodies.get(*i).is_some_and(|body| body.kind == BodyKind::Dynamic);
-        match (measure, body) {
-            (Measure::RestingHeight, Some(i)) if is_dynamic(i) => Ok(()),
-            (Measure::RestingHeight, Some(i)) => {
-                Err(Error::invalid("reference.body", format!("{i} is not a dynamic body of the scene")))
+        let wrong = match (measure, body) {
+            (Measure::RestingHeight, None) => "missing: the bodies whose height is known".to_string(),
+            (Measure::RestingHeight, Some(i)) if !is_dynamic(i) => {
+                format!("{i} is not a dynamic body of the scene")
             }
-            (Measure::RestingHeight, None) => {
-                Err(Error::invalid("reference.body", "missing: the bodies whose height is known"))
+            (Measure::GroundLoad | Measure::GreatestDrop, Some(i)) => {
+                format!("{i}, but the measure concerns no body")
             }
-            (_, Some(i)) => {
-                Err(Error::invalid("reference.body", format!("{i}, but the measure concerns no body")))
-            }
-            (_, None) => Ok(()),
-        }
+            _ => return Ok(()),
+        };
+        Err(Error::invalid("reference.body", wrong))
     }
-}
 
-impl Expect {
     /// Expectations of a scene of the catalog.
     pub(super) fn of(name: &str, demands: &[Demand], truth: Option<&Truth>, tolerances: &Tolerances) -> Self {
         let mut expect = Expect { catalog: Some(name.to_string()), ..Expect::default() };

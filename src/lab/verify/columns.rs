@@ -72,7 +72,7 @@ pub(super) static CASES: &[Case] = &[
     // five bodies.
     Case::new(
         "B22.order",
-        "spread of a column's first velocities over 32 orders at 500 times the sweeps",
+        "spread of a column's first velocities over 32 orders, 500 times the sweeps",
         "m/s",
     )
     .within("1e-5 of g dt: zero in f32")

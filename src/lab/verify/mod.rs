@@ -1,8 +1,12 @@
 //! Hard test cases with known analytic answers, run against every solver.
 //!
 //! A case runs a scene, reads one number from the state in `f64` and compares it with the known answer,
-//! independently of the solver. A new case is one function and one row in the file of its group; [`CASES`]
-//! lists them all. An id consists of a family (A: few bodies, B: many) and a name.
+//! independently of the solver. A new case is one row in the file of its group, and [`CASES`] lists them all: what
+//! is measured, the tolerance with its reason, what is required with its reason, and how it is measured. Most
+//! rows share a few shapes of `lab.rs`: a scene of the catalog with its observer (`catalog`), a reading of the
+//! last state (`after`), the largest value of a window (`most`), the worst of a list of parameters (`worst_of`),
+//! a threshold (`threshold`) and a sweep (`sweep`). An id consists of a family (A: few bodies, B: many) and a
+//! name.
 //!
 //! # Tolerances
 //!

@@ -33,41 +33,35 @@ pub(super) static CASES: &[Case] = &[
         }),
     // A disc of 3 kg that falls at v bounces off the ground and hits one of 1 kg that falls 2 mm above it.
     // Both are elastic: the lower disc stops, the upper one leaves at 2 v.
-    Case::new(
-        "A20.stacked",
-        "speed of a disc hit by a heavier one that rebounds, over that of the fall",
-        "1",
-    )
-    .within("1 %: the order of impacts")
-    .required("impacts spread from body to body in waves")
-    .by(|lab| {
-        let speed = 5.0;
-        let falling = |y, mass| SceneBody::dynamic([0.0, y], elastic(mass)).moving([0.0, -speed], 0.0);
-        let bodies = vec![ground(5.0, 0.0), falling(0.7, 3.0), falling(1.702, 1.0)];
-        lab.after(Scene::new("stacked", bodies).weightless(), 0.2, |world| {
-            let found = [1, 2].map(|i| velocity(world, i)[1] / speed);
-            let off = largest([found[0].abs(), (found[1] - 2.0).abs()]);
-            Finding::new(off, 0.0, 0.01).note(format!("speeds {found:.4?}"))
-        })
-    }),
+    Case::new("A20.stacked", "speed of a disc hit by a heavier one that rebounds, over the fall's", "1")
+        .within("1 %: the order of impacts")
+        .required("impacts spread from body to body in waves")
+        .by(|lab| {
+            let speed = 5.0;
+            let falling = |y, mass| SceneBody::dynamic([0.0, y], elastic(mass)).moving([0.0, -speed], 0.0);
+            let bodies = vec![ground(5.0, 0.0), falling(0.7, 3.0), falling(1.702, 1.0)];
+            lab.after(Scene::new("stacked", bodies).weightless(), 0.2, |world| {
+                let found = [1, 2].map(|i| velocity(world, i)[1] / speed);
+                let off = largest([found[0].abs(), (found[1] - 2.0).abs()]);
+                Finding::new(off, 0.0, 0.01).note(format!("speeds {found:.4?}"))
+            })
+        }),
     // Five boxes move on together, at a fifth of the first one's speed.
     Case::new("A20.plastic", "speeds after a plastic impact of a box on four, over the common speed", "1")
         .within("1 %")
         .required("plastic impacts spread from body to body before the step")
         .by(|lab| row(lab, boxes(&[1.0; 5]), 1.0, 1.0, &[1.0; 5], 0.01)),
     // The common speed is Σ m_i v_i/Σ m_i, for any masses.
-    Case::new(
-        "A20.coupling",
-        "speeds after a plastic impact on six boxes of 1 to 4 kg, over the common one",
-        "1",
-    )
-    .within("1 %")
-    .not_required("an impact visits each point that it reaches 8 times on average; this row needs hundreds")
-    .by(|lab| {
-        let masses = [4.0, 1.0, 2.0, 3.0, 4.0, 1.0, 2.0];
-        let common = 5.0 * masses[0] / masses.iter().sum::<f64>();
-        row(lab, boxes(&masses), 1.0, common, &[1.0; 7], 0.01)
-    }),
+    Case::new("A20.coupling", "the same on six boxes of 1 to 4 kg", "1")
+        .within("1 %")
+        .not_required(
+            "an impact visits each point that it reaches 8 times on average; this row needs hundreds",
+        )
+        .by(|lab| {
+            let masses = [4.0, 1.0, 2.0, 3.0, 4.0, 1.0, 2.0];
+            let common = 5.0 * masses[0] / masses.iter().sum::<f64>();
+            row(lab, boxes(&masses), 1.0, common, &[1.0; 7], 0.01)
+        }),
     // Discs that pass without touching do not change their velocities.
     Case::new("A20.miss", "change of velocity of a disc that passes another at 1, 5 or 15 mm", "m/s")
         .within("1e-5 of 5 m/s: zero in f32")
@@ -85,50 +79,42 @@ pub(super) static CASES: &[Case] = &[
     // Both normals are at 30° to the direction of travel, n = (c, ±½) with c² = ¾, and all discs have mass 1.
     // The incoming disc leaves at v − 2 J c, the others at J n, with J (1 + 2 c²) = (1 + e) v c. The two
     // others separate, so they do not push each other.
-    Case::new(
-        "A20.pair",
-        "velocities after a disc hits two touching ones, worst of e and starting distance",
-        "m/s",
-    )
-    .within("1e-3 of 4 m/s: the tolerance at which impacts stop spreading")
-    .required("all points of an impact are solved together, at its time within the step")
-    .by(|lab| {
-        let c = 0.75f64.sqrt();
-        largest_of(pairs(&[1.0, 0.5, 0.0], GAPS), 1e-3 * SPEED, |(e, gap)| {
-            let shape = || SceneShape::disc(0.5).density(4.0 / PI).friction(0.0).restitution(e);
-            let disc = |x: f64, y: f64| SceneBody::dynamic([x, y], shape());
-            let first = disc(-c - gap, 0.0).moving([SPEED, 0.0], 0.0);
-            let world = hit(lab, vec![first, disc(0.0, 0.5), disc(0.0, -0.5)], gap)?;
-            let j = (1.0 + e) * SPEED * c / (1.0 + 2.0 * c * c);
-            let truth = [(0, [SPEED - 2.0 * j * c, 0.0]), (1, [j * c, 0.5 * j]), (2, [j * c, -0.5 * j])];
-            Ok(farthest(&world, &truth))
-        })
-    }),
+    Case::new("A20.pair", "velocities after a disc hits two touching ones, worst of e and distance", "m/s")
+        .within("1e-3 of 4 m/s: the tolerance at which impacts stop spreading")
+        .required("all points of an impact are solved together, at its time within the step")
+        .by(|lab| {
+            let c = 0.75f64.sqrt();
+            largest_of(pairs(&[1.0, 0.5, 0.0], GAPS), 1e-3 * SPEED, |(e, gap)| {
+                let shape = || SceneShape::disc(0.5).density(4.0 / PI).friction(0.0).restitution(e);
+                let disc = |x: f64, y: f64| SceneBody::dynamic([x, y], shape());
+                let first = disc(-c - gap, 0.0).moving([SPEED, 0.0], 0.0);
+                let world = hit(lab, vec![first, disc(0.0, 0.5), disc(0.0, -0.5)], gap)?;
+                let j = (1.0 + e) * SPEED * c / (1.0 + 2.0 * c * c);
+                let truth = [(0, [SPEED - 2.0 * j * c, 0.0]), (1, [j * c, 0.5 * j]), (2, [j * c, -0.5 * j])];
+                Ok(farthest(&world, &truth))
+            })
+        }),
     // A wedge of mass M and slope α can only glide: J (1/m + sin²α/M) = v cos α.
-    Case::new(
-        "A20.wedge",
-        "velocities after a disc falls on a wedge on ice, worst of starting distances",
-        "m/s",
-    )
-    .within("1e-3 of 4 m/s, as A20.pair")
-    .required("plastic impacts spread from body to body before the step")
-    .by(|lab| {
-        let (slope, radius, half) = (0.5f64, 0.25, 2.0);
-        let (sin, cos) = slope.sin_cos();
-        largest_of(GAPS, 1e-3 * SPEED, |&gap| {
-            let points = vec![[-half, 0.0], [half, 0.0], [-half, 2.0 * half * slope.tan()]];
-            let wedge = SceneBody::dynamic([0.0, 0.0], SceneShape::polygon(points).friction(0.0));
-            let at = [radius * sin, half * slope.tan() + radius * cos + gap];
-            let disc = SceneBody::dynamic(at, SceneShape::disc(radius).friction(0.0));
-            let bodies = vec![ground(50.0, 0.0), wedge, disc.moving([0.0, -SPEED], 0.0)];
-            let world = hit(lab, bodies, gap)?;
-            let masses: Vec<f64> = dynamic(&world).map(|(_, mass, _)| mass).collect();
-            let (of_wedge, of_disc) = (masses[0], masses[1]);
-            let j = SPEED * cos / (1.0 / of_disc + sin * sin / of_wedge);
-            let of_disc = [j * sin / of_disc, j * cos / of_disc - SPEED];
-            Ok(farthest(&world, &[(1, [-j * sin / of_wedge, 0.0]), (2, of_disc)]))
-        })
-    }),
+    Case::new("A20.wedge", "velocities after a disc falls on a wedge on ice, worst of distances", "m/s")
+        .within("1e-3 of 4 m/s, as A20.pair")
+        .required("plastic impacts spread from body to body before the step")
+        .by(|lab| {
+            let (slope, radius, half) = (0.5f64, 0.25, 2.0);
+            let (sin, cos) = slope.sin_cos();
+            largest_of(GAPS, 1e-3 * SPEED, |&gap| {
+                let points = vec![[-half, 0.0], [half, 0.0], [-half, 2.0 * half * slope.tan()]];
+                let wedge = SceneBody::dynamic([0.0, 0.0], SceneShape::polygon(points).friction(0.0));
+                let at = [radius * sin, half * slope.tan() + radius * cos + gap];
+                let disc = SceneBody::dynamic(at, SceneShape::disc(radius).friction(0.0));
+                let bodies = vec![ground(50.0, 0.0), wedge, disc.moving([0.0, -SPEED], 0.0)];
+                let world = hit(lab, bodies, gap)?;
+                let masses: Vec<f64> = dynamic(&world).map(|(_, mass, _)| mass).collect();
+                let (of_wedge, of_disc) = (masses[0], masses[1]);
+                let j = SPEED * cos / (1.0 / of_disc + sin * sin / of_wedge);
+                let of_disc = [j * sin / of_disc, j * cos / of_disc - SPEED];
+                Ok(farthest(&world, &[(1, [-j * sin / of_wedge, 0.0]), (2, of_disc)]))
+            })
+        }),
     // The curb's upper edge stops the box at a height a below its center. The ground stops the box's front
     // edge, b ahead of its center. Both impulses pass through the curb's edge, about which angular momentum
     // is conserved.
@@ -149,29 +135,25 @@ pub(super) static CASES: &[Case] = &[
         }),
     // A disc at 10 m/s hits a resting one with an offset of one radius, so n is at 30°. The impact transfers
     // v cos 30° (1 + e)/2 along n.
-    Case::new(
-        "A27.oblique",
-        "velocities after an oblique collision of discs, over the first; worst of e",
-        "1",
-    )
-    .within("1 %: far less than the difference between the laws")
-    .required("round shapes use the contact frame at the moment of touch")
-    .by(|lab| {
-        let (radius, speed) = (0.5, 10.0);
-        let (sin, cos): (f64, f64) = (0.5, 0.75f64.sqrt());
-        let tenths: Vec<u32> = (0..10).collect();
-        let found = largest_of(pairs(&[1.0, 0.5, 0.0], &tenths), 0.01, |(e, k)| {
-            let start = -3.0 - speed / 60.0 * f64::from(k) / 10.0;
-            let disc = |at| SceneBody::dynamic(at, SceneShape::disc(radius).friction(0.0).restitution(e));
-            let moving = disc([start, 2.0 * radius * sin]).moving([speed, 0.0], 0.0);
-            let scene = Scene::new("oblique", vec![moving, disc([0.0, 0.0])]).weightless();
-            let world = lab.run(scene, 1.0, |_| ())?;
-            let taken = 0.5 * (1.0 + e) * speed * cos;
-            let given = [taken * cos, -taken * sin];
-            Ok(farthest(&world, &[(0, [speed - given[0], -given[1]]), (1, given)]))
-        })?;
-        Ok(Finding { measured: found.measured / speed, ..found })
-    }),
+    Case::new("A27.oblique", "velocities after an oblique collision of discs, over the first, worst", "1")
+        .within("1 %: far less than the difference between the laws")
+        .required("round shapes use the contact frame at the moment of touch")
+        .by(|lab| {
+            let (radius, speed) = (0.5, 10.0);
+            let (sin, cos): (f64, f64) = (0.5, 0.75f64.sqrt());
+            let tenths: Vec<u32> = (0..10).collect();
+            let found = largest_of(pairs(&[1.0, 0.5, 0.0], &tenths), 0.01, |(e, k)| {
+                let start = -3.0 - speed / 60.0 * f64::from(k) / 10.0;
+                let disc = |at| SceneBody::dynamic(at, SceneShape::disc(radius).friction(0.0).restitution(e));
+                let moving = disc([start, 2.0 * radius * sin]).moving([speed, 0.0], 0.0);
+                let scene = Scene::new("oblique", vec![moving, disc([0.0, 0.0])]).weightless();
+                let world = lab.run(scene, 1.0, |_| ())?;
+                let taken = 0.5 * (1.0 + e) * speed * cos;
+                let given = [taken * cos, -taken * sin];
+                Ok(farthest(&world, &[(0, [speed - given[0], -given[1]]), (1, given)]))
+            })?;
+            Ok(Finding { measured: found.measured / speed, ..found })
+        }),
     // A block of 1 kg on a wedge of 2 kg with the angle α, all frictionless. The wedge accelerates away at A
     // = m g sin α cos α/(M + m sin² α).
     Case::new("A21.wedge", "displacement of a frictionless wedge under a block that slides down it", "m")

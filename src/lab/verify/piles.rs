@@ -9,32 +9,28 @@ use glam::Vec2;
 pub(super) static CASES: &[Case] = &[
     // Boxes of sides 1, 2, 4 … 32 m, the smallest at the bottom, if the largest is still on top: its underside
     // starts at a height of 31 m.
-    Case::new(
-        "B6.doubling",
-        "ground load under boxes of 1 to 32 m, smallest at the bottom, 9 s to 10 s",
-        "N",
-    )
-    .within("momentum per step at the speed limit of B5.jitter")
-    .required("springs are shortened by the sag of 1364 kg on 1 kg")
-    .by(|lab| {
-        let boxes = (0..6).map(|i| {
-            let half = 0.5 * f64::from(1 << i);
-            SceneBody::dynamic([0.0, 3.0 * half - 1.0], SceneShape::rectangle(half, half))
-        });
-        let weight = (4f64.powi(6) - 1.0) / 3.0 * G;
-        let mut worst: f64 = weight;
-        let bodies = with(ground(50.0, 0.6), boxes);
-        let world = lab.run(Scene::new("doubling", bodies), 10.0, |world| {
-            if time(world) > 9.0 {
-                let load = ground_load(world);
-                worst = if (load - weight).abs() >= (worst - weight).abs() { load } else { worst };
-            }
-        })?;
-        let lowest = center(&world, 6)[1] - 16.0;
-        let load = if lowest > 31.0 - 0.5 { worst } else { f64::INFINITY };
-        let note = format!("underside of the largest at {lowest:.2} m of 31");
-        Ok(Finding::new(load, weight, load_tolerance(weight / G, world.settings.dt.into())).note(note))
-    }),
+    Case::new("B6.doubling", "ground load under boxes of 1 to 32 m, smallest at the bottom", "N")
+        .within("momentum per step at the speed limit of B5.jitter")
+        .required("springs are shortened by the sag of 1364 kg on 1 kg")
+        .by(|lab| {
+            let boxes = (0..6).map(|i| {
+                let half = 0.5 * f64::from(1 << i);
+                SceneBody::dynamic([0.0, 3.0 * half - 1.0], SceneShape::rectangle(half, half))
+            });
+            let weight = (4f64.powi(6) - 1.0) / 3.0 * G;
+            let mut worst: f64 = weight;
+            let bodies = with(ground(50.0, 0.6), boxes);
+            let world = lab.run(Scene::new("doubling", bodies), 10.0, |world| {
+                if time(world) > 9.0 {
+                    let load = ground_load(world);
+                    worst = if (load - weight).abs() >= (worst - weight).abs() { load } else { worst };
+                }
+            })?;
+            let lowest = center(&world, 6)[1] - 16.0;
+            let load = if lowest > 31.0 - 0.5 { worst } else { f64::INFINITY };
+            let note = format!("underside of the largest at {lowest:.2} m of 31");
+            Ok(Finding::new(load, weight, load_tolerance(weight / G, world.settings.dt.into())).note(note))
+        }),
     Case::new("B7.pyramid", "ground load of a pyramid of 55 boxes, last second of five", "N")
         .within("momentum per step at the speed limit of B5.jitter")
         .required("cos²(π/20) per sweep to the power 1920 is 2e-21")
@@ -79,20 +75,16 @@ pub(super) static CASES: &[Case] = &[
     // A row of n unit boxes pressed against a wall needs friction for the weight n m g, which takes a push of
     // n/µ times the weight of one box. The joint at the wall needs a moment of n²/2 m g. A push through its
     // middle provides up to half of itself: 25 m g for five boxes.
-    Case::new(
-        "B24.pressed",
-        "displacement in 10 s of five boxes in a row that 27 weights press on a wall",
-        "m",
-    )
-    .within("the slop")
-    .required("user forces count as loads, and springs are shortened by their sag")
-    .by(|lab| {
-        let wall = SceneBody::fixed([-0.5, 0.0], SceneShape::rectangle(0.5, 20.0));
-        let boxes = (0..5).map(|i| square(f64::from(i) + 0.5, 0.0));
-        let mut world = lab.world(Scene::new("pressed", with(wall, boxes)))?;
-        world.bodies.force_x[5] = (-27.0 * G) as f32;
-        moves(&mut world, 10.0)
-    }),
+    Case::new("B24.pressed", "displacement in 10 s of five boxes that 27 weights press on a wall", "m")
+        .within("the slop")
+        .required("user forces count as loads, and springs are shortened by their sag")
+        .by(|lab| {
+            let wall = SceneBody::fixed([-0.5, 0.0], SceneShape::rectangle(0.5, 20.0));
+            let boxes = (0..5).map(|i| square(f64::from(i) + 0.5, 0.0));
+            let mut world = lab.world(Scene::new("pressed", with(wall, boxes)))?;
+            world.bodies.force_x[5] = (-27.0 * G) as f32;
+            moves(&mut world, 10.0)
+        }),
     Case::new("B24.needles", "displacement in 20 s of a stack of ten boxes of 0.1 m × 1 m", "m")
         .within("the slop")
         .required("loads are fed forward, so a lean decays")
@@ -100,27 +92,23 @@ pub(super) static CASES: &[Case] = &[
             let bodies = with(ground(20.0, 0.6), column(10, [0.05, 0.5], 0.0));
             moves(&mut lab.world(Scene::new("needles", bodies))?, 20.0)
         }),
-    Case::new(
-        "B24.tree",
-        "displacement in 20 s of five stories, each a plank on a post with two weights",
-        "m",
-    )
-    .within("the slop")
-    .required("loads are fed forward, so a lean decays")
-    .by(|lab| {
-        let storey = |i: u32| {
-            let floor = 1.1 * f64::from(i);
-            let weight = || SceneShape::rectangle(0.25, 0.25).density(4.0);
-            [
-                SceneBody::dynamic([0.0, floor + 0.5], SceneShape::rectangle(0.2, 0.5)),
-                SceneBody::dynamic([0.0, floor + 1.05], SceneShape::rectangle(2.0, 0.05)),
-                SceneBody::dynamic([-1.75, floor + 1.35], weight()),
-                SceneBody::dynamic([1.75, floor + 1.35], weight()),
-            ]
-        };
-        let bodies = with(ground(20.0, 0.6), (0..5).flat_map(storey));
-        moves(&mut lab.world(Scene::new("tree", bodies))?, 20.0)
-    }),
+    Case::new("B24.tree", "displacement in 20 s of five planks with weights, each on a post", "m")
+        .within("the slop")
+        .required("loads are fed forward, so a lean decays")
+        .by(|lab| {
+            let storey = |i: u32| {
+                let floor = 1.1 * f64::from(i);
+                let weight = || SceneShape::rectangle(0.25, 0.25).density(4.0);
+                [
+                    SceneBody::dynamic([0.0, floor + 0.5], SceneShape::rectangle(0.2, 0.5)),
+                    SceneBody::dynamic([0.0, floor + 1.05], SceneShape::rectangle(2.0, 0.05)),
+                    SceneBody::dynamic([-1.75, floor + 1.35], weight()),
+                    SceneBody::dynamic([1.75, floor + 1.35], weight()),
+                ]
+            };
+            let bodies = with(ground(20.0, 0.6), (0..5).flat_map(storey));
+            moves(&mut lab.world(Scene::new("tree", bodies))?, 20.0)
+        }),
     Case::new("B24.turned", "displacement in 20 s of twenty boxes in a world rotated by 45°", "m")
         .within("the slop")
         .required("only gravity defines a direction")
@@ -160,18 +148,14 @@ pub(super) static CASES: &[Case] = &[
             world.settings.gravity = gravity;
             moves(&mut world, 10.0)
         }),
-    Case::new(
-        "B25.heavy",
-        "displacement in 20 s of twenty boxes with 100 times the gravity on the top box",
-        "m",
-    )
-    .within("the slop")
-    .required("loads are fed forward, so a lean decays")
-    .by(|lab| {
-        let mut scene = lab.scene("stack:20")?;
-        scene.bodies[20].gravity_scale = 100.0;
-        moves(&mut lab.world(scene)?, 20.0)
-    }),
+    Case::new("B25.heavy", "displacement in 20 s of twenty boxes, 100 times the gravity on the top", "m")
+        .within("the slop")
+        .required("loads are fed forward, so a lean decays")
+        .by(|lab| {
+            let mut scene = lab.scene("stack:20")?;
+            scene.bodies[20].gravity_scale = 100.0;
+            moves(&mut lab.world(scene)?, 20.0)
+        }),
     Case::new("B25.pushed", "sideways displacement in 20 s of twenty boxes under 100 weights at once", "m")
         .within("the slop")
         .required("user forces count as weights, and their loads converge within 32 steps")
@@ -183,37 +167,30 @@ pub(super) static CASES: &[Case] = &[
             let [x, ..] = watch(&mut world, 20.0)?;
             Ok(Finding::new(x, 0.0, SLOP))
         }),
-    Case::new(
-        "B25.set",
-        "displacement in 10 s of ten boxes after one of 100 times the mass is placed on top",
-        "m",
-    )
-    .within("the slop")
-    .required("a new load reaches the whole pile in one step")
-    .by(|lab| {
-        let mut world = lab.run(lab.scene("stack:10")?, 3.0, |_| ())?;
-        let highest = largest(dynamic(&world).map(|(i, ..)| center(&world, i)[1]));
-        let shape = Shape::rectangle("B25.set", Vec2::splat(0.5), Vec2::ZERO, 0.0, 0.0).map_err(invalid)?;
-        let heavy = ShapeDef { density: 100.0, ..ShapeDef::new(shape) };
-        let body = BodyDef::new(BodyKind::Dynamic, [0.0, highest + 1.0], vec![heavy]);
-        world.add_body(&body).map_err(invalid)?;
-        moves(&mut world, 10.0)
-    }),
-    Case::new(
-        "B25.step",
-        "largest speed in twenty boxes at steps of 1/60, 1/240, 1/30 and 1/60 s, 1 s each",
-        "m/s",
-    )
-    .within("0.05 m/s, as for B9")
-    .required("impulses and loads scale with the length of the step")
-    .by(|lab| {
-        let mut world = rested(lab)?;
-        let usual = world.settings.dt;
-        largest_of([1.0, 0.25, 2.0, 1.0], 0.05, |factor| {
-            world.settings.dt = factor * usual;
-            Ok(watch(&mut world, 1.0)?[2])
-        })
-    }),
+    Case::new("B25.set", "displacement in 10 s of ten boxes after one of 100 kg is placed on top", "m")
+        .within("the slop")
+        .required("a new load reaches the whole pile in one step")
+        .by(|lab| {
+            let mut world = lab.run(lab.scene("stack:10")?, 3.0, |_| ())?;
+            let highest = largest(dynamic(&world).map(|(i, ..)| center(&world, i)[1]));
+            let shape =
+                Shape::rectangle("B25.set", Vec2::splat(0.5), Vec2::ZERO, 0.0, 0.0).map_err(invalid)?;
+            let heavy = ShapeDef { density: 100.0, ..ShapeDef::new(shape) };
+            let body = BodyDef::new(BodyKind::Dynamic, [0.0, highest + 1.0], vec![heavy]);
+            world.add_body(&body).map_err(invalid)?;
+            moves(&mut world, 10.0)
+        }),
+    Case::new("B25.step", "largest speed in twenty boxes at steps of 1/60, 1/240, 1/30 and 1/60 s", "m/s")
+        .within("0.05 m/s, as for B9")
+        .required("impulses and loads scale with the length of the step")
+        .by(|lab| {
+            let mut world = rested(lab)?;
+            let usual = world.settings.dt;
+            largest_of([1.0, 0.25, 2.0, 1.0], 0.05, |factor| {
+                world.settings.dt = factor * usual;
+                Ok(watch(&mut world, 1.0)?[2])
+            })
+        }),
 ];
 
 fn invalid(error: impl std::fmt::Display) -> Failure {

@@ -7,25 +7,21 @@ pub(super) static CASES: &[Case] = &[
     // A plank of thickness 2 b on a fixed disc of radius R, rolled by φ from its middle. The contact is at R
     // (sin φ, cos φ), and the middle of the plank's lower face is R φ uphill of it. T = 2π √((k² + b²)/(g (R
     // − b))).
-    Case::new(
-        "A26.plank",
-        "amplitude of a plank that rocks on a round support, tenth second over first",
-        "1",
-    )
-    .within("1 %: sampling misses a peak by (ω dt)²/8, 0.1 %")
-    .required("rolling contacts use the frame of the middle of the step, so no torque lags")
-    .by(|lab| {
-        let (radius, half, b, start) = (1.0, 1.0, 0.1, 0.05f64);
-        let (sin, cos) = start.sin_cos();
-        let across = (radius + b) * sin - radius * start * cos;
-        let up = (radius + b) * cos + radius * start * sin;
-        let support = SceneBody::fixed([0.0, 0.0], SceneShape::disc(radius).friction(1.0));
-        let plank = SceneShape::rectangle(half, b).friction(1.0);
-        let plank = SceneBody::dynamic([across, up], plank).turned(-start);
-        let squared = (half * half + b * b) / 3.0;
-        let period = TAU * ((squared + b * b) / (G * (radius - b))).sqrt();
-        growth(lab, Scene::new("plank", vec![support, plank]), period)
-    }),
+    Case::new("A26.plank", "amplitude of a plank on a round support, tenth second over first", "1")
+        .within("1 %: sampling misses a peak by (ω dt)²/8, 0.1 %")
+        .required("rolling contacts use the frame of the middle of the step, so no torque lags")
+        .by(|lab| {
+            let (radius, half, b, start) = (1.0, 1.0, 0.1, 0.05f64);
+            let (sin, cos) = start.sin_cos();
+            let across = (radius + b) * sin - radius * start * cos;
+            let up = (radius + b) * cos + radius * start * sin;
+            let support = SceneBody::fixed([0.0, 0.0], SceneShape::disc(radius).friction(1.0));
+            let plank = SceneShape::rectangle(half, b).friction(1.0);
+            let plank = SceneBody::dynamic([across, up], plank).turned(-start);
+            let squared = (half * half + b * b) / 3.0;
+            let period = TAU * ((squared + b * b) / (G * (radius - b))).sqrt();
+            growth(lab, Scene::new("plank", vec![support, plank]), period)
+        }),
     // A light disc of radius R with a dense core of radius r, d below the disc's center. The center of mass
     // is e below the disc's center. T = 2π √((I + m (R − e)²)/(m g e)).
     Case::new("A26.eccentric", "the same for a disc with an off-center core that rolls to and fro", "1")
@@ -101,23 +97,19 @@ pub(super) static CASES: &[Case] = &[
         }),
     // A disc spins counterclockwise on the floor. Friction µ N presses it against the wall on its left, which
     // carries µ² N of its weight: N = m g/(1 + µ²), and ω' = −2 µ (1 + µ) g/((1 + µ²) r).
-    Case::new(
-        "A26.corner",
-        "spin of a disc that turns in a corner of floor and wall, after half a second",
-        "rad/s",
-    )
-    .within("0.5 %, as for A3")
-    .required("two rows of one body converge in a few warm-started steps")
-    .by(|lab| {
-        let (friction, radius, start, seconds) = (0.4, 0.5, 20.0, 0.5);
-        let disc = SceneBody::dynamic([radius, radius], SceneShape::disc(radius).friction(friction));
-        let wall = ground(20.0, friction).turned(FRAC_PI_2);
-        let bodies = vec![ground(20.0, friction), wall, disc.moving([0.0, 0.0], start)];
-        let slows = 2.0 * friction * (1.0 + friction) * G / ((1.0 + friction * friction) * radius);
-        let truth = start - slows * seconds;
-        let scene = Scene::new("corner", bodies);
-        lab.after(scene, seconds, |world| Finding::new(spin(world, 2), truth, 5e-3 * truth))
-    }),
+    Case::new("A26.corner", "spin of a disc that turns between floor and wall, after half a second", "rad/s")
+        .within("0.5 %, as for A3")
+        .required("two rows of one body converge in a few warm-started steps")
+        .by(|lab| {
+            let (friction, radius, start, seconds) = (0.4, 0.5, 20.0, 0.5);
+            let disc = SceneBody::dynamic([radius, radius], SceneShape::disc(radius).friction(friction));
+            let wall = ground(20.0, friction).turned(FRAC_PI_2);
+            let bodies = vec![ground(20.0, friction), wall, disc.moving([0.0, 0.0], start)];
+            let slows = 2.0 * friction * (1.0 + friction) * G / ((1.0 + friction * friction) * radius);
+            let truth = start - slows * seconds;
+            let scene = Scene::new("corner", bodies);
+            lab.after(scene, seconds, |world| Finding::new(spin(world, 2), truth, 5e-3 * truth))
+        }),
     // A square frame rotates at 3 rad/s without gravity. A box lies on the inside of a wall, 1 m from the
     // wall's middle and 3.5 m from the axis along the normal. It needs µ = 1/3.5 to stay and has 0.6.
     Case::new("A26.turntable", "slip in 10 s of a box on the inside of a rotating frame", "m")

@@ -130,14 +130,10 @@ pub(super) static CASES: &[Case] = &[
             Ok(Finding::new(speed, -START / 3.0, 7.0 / 9.0 * ARM * START))
         }),
     // The speed is 2/3 v0 even while overlap is pushed out: friction acts at the radius.
-    Case::new(
-        "A4.deep",
-        "rolling speed of a disc that starts with a tenth of its radius in the ground",
-        "m/s",
-    )
-    .within("f32 rounding: 1e-4 m/s")
-    .required("on a static body the contact point lies on the other body's surface")
-    .by(|lab| Ok(Finding::new(rolling_speed(lab, 0.2, 0.45, 0.0)?, 2.0 / 3.0 * START, 1e-4))),
+    Case::new("A4.deep", "rolling speed of a disc that starts a tenth of its radius deep", "m/s")
+        .within("f32 rounding: 1e-4 m/s")
+        .required("on a static body the contact point lies on the other body's surface")
+        .by(|lab| Ok(Finding::new(rolling_speed(lab, 0.2, 0.45, 0.0)?, 2.0 / 3.0 * START, 1e-4))),
     // Every impulse passes through the line of contact, so I w0 = (I + m r²) w, however the disc bounces
     // before it rolls.
     Case::new("A4.dropped", "rolling speed of a spinning disc that falls and bounces, r ω₀/3", "m/s")
@@ -309,20 +305,16 @@ pub(super) static CASES: &[Case] = &[
             })
         }),
     // A disc rolling at 5 m/s keeps its speed and its height.
-    Case::new(
-        "A24.seams",
-        "speed that a rolling disc loses on square tiles, and height that it gains",
-        "m/s, m",
-    )
-    .within("1e-3")
-    .required("gaps of circles are taken at their closest approach")
-    .by(|lab| {
-        let disc = SceneBody::dynamic([0.0, 0.5], SceneShape::disc(0.5).density(4.0 / PI).friction(0.6));
-        let scene = Scene::new("seams", on_tiles(disc.moving([5.0, 0.0], -10.0), 0.6));
-        lab.most(scene, 0.0..3.0, 1e-3, |world| {
-            largest([(velocity(world, TILES)[0] - 5.0).abs(), center(world, TILES)[1] - 0.5])
-        })
-    }),
+    Case::new("A24.seams", "speed that a rolling disc loses on tiles, and height that it gains", "m/s, m")
+        .within("1e-3")
+        .required("gaps of circles are taken at their closest approach")
+        .by(|lab| {
+            let disc = SceneBody::dynamic([0.0, 0.5], SceneShape::disc(0.5).density(4.0 / PI).friction(0.6));
+            let scene = Scene::new("seams", on_tiles(disc.moving([5.0, 0.0], -10.0), 0.6));
+            lab.most(scene, 0.0..3.0, 1e-3, |world| {
+                largest([(velocity(world, TILES)[0] - 5.0).abs(), center(world, TILES)[1] - 0.5])
+            })
+        }),
 ];
 
 /// Angle of the inclines (rad).
