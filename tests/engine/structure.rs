@@ -276,8 +276,8 @@ fn every_path_in_the_list_of_sources_exists() {
     assert!(paths > 40, "{paths} paths found");
 }
 
-/// Step times that are compared with each other come from one function. So `run`, `study`, `advise` and
-/// `savings` cannot report different times for one setting. All other clocks measure something else.
+/// Step times that are compared with each other come from one function. So `run`, `study` and
+/// `advise` cannot report different times for one setting. All other clocks measure something else.
 #[test]
 fn steps_are_timed_in_one_place() {
     let source = root().join("src");
@@ -299,16 +299,9 @@ fn steps_are_timed_in_one_place() {
         "lab/converge/replay.rs",
         // Run time of a command.
         "cli/times.rs",
-        "lab/advise/search.rs",
     ];
     assert_eq!(clocks, known.map(String::from).into_iter().collect());
-    for user in [
-        "cli/times.rs",
-        "lab/study/mod.rs",
-        "lab/study/savings.rs",
-        "lab/advise/mod.rs",
-        "lab/advise/search.rs",
-    ] {
+    for user in ["cli/times.rs", "lab/study/mod.rs"] {
         let text = code(&std::fs::read_to_string(source.join(user)).unwrap());
         assert!(text.contains("time_in_turns(") || text.contains("Interleaved::new("), "{user}");
     }
