@@ -48,7 +48,7 @@ pub struct Cli {
 pub enum Command {
     /// Compare solvers, budgets and lane widths by time and by error
     #[command(after_help = STUDY_EXAMPLES)]
-    Study(StudyArgs),
+    Study(Box<StudyArgs>),
     Compare(CompareArgs),
     Run(RunArgs),
     Advise(AdviseArgs),

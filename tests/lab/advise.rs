@@ -183,7 +183,7 @@ fn bad_requests_are_refused_in_one_line() {
         (&["stack:3", "--max-residual", "1%"], &["max-residual", "'1%'"]),
         (&["stack:3", "--max-reference", "5N"], &["max-reference", "'5N'"]),
         (&["circle_pile:10", "--max-reference", "1mm"], &["max-reference", "circle_pile:10"]),
-        (&["smash", "--max-penetration", "1mm", "--max-rest-speed", "1mm/s"], &["max-rest-speed", "smash"]),
+        (&["smash", "--max-penetration", "1mm", "--max-rest-speed", "1m/s"], &["max-rest-speed", "smash"]),
         (&["stack:3", "--max-penetration", "1mm", "--lanes", "3"], &["lanes", "3"]),
         (&["stack:3", "--max-penetration", "1mm", "--solvers", "pgz"], &["'pgz'", "'pgs'"]),
         (&["stack:3", "--max-penetration", "1mm", "--steps", "0"], &["steps", "0"]),

@@ -118,10 +118,10 @@ const BUSY: f64 = 0.02;
 const FEWEST: usize = 8;
 
 /// Probability that a comparison of one program with itself reports any setting as changed, and any solver.
-const FALSE_ALARM: f64 = 0.01;
+const FALSE_ALARM: f64 = 0.02;
 
 /// Fraction of the deviations on a side that form its tail, and their smallest number.
-const TAIL: f64 = 0.2;
+const TAIL: f64 = 0.4;
 const FEWEST_IN_TAIL: usize = 10;
 
 impl Noise {

@@ -204,6 +204,6 @@ mod tests {
         let lines: Vec<&str> = text.lines().filter(|l| l.starts_with("pgs")).collect();
         assert_eq!(lines.len(), 4);
         let cells = |line: &&str| line.split("  ").filter(|cell| !cell.trim().is_empty()).count();
-        assert!(lines.iter().all(|line| cells(line) == 12), "{text}");
+        assert!(lines.iter().all(|line| cells(line) == 14), "{text}");
     }
 }

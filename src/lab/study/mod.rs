@@ -144,6 +144,9 @@ pub struct RunOutcome {
     pub hash: u64,
 }
 
+/// Receives the records of a scene, and the settings that a search found for it.
+pub type SceneFinished<'a> = dyn FnMut(&[Record], &[FoundBudgets]) -> Result<(), Error> + 'a;
+
 /// Runs the plan, scene by scene. Returns one record per scene, solver, budget, order and width, in that
 /// order. `finished` receives the records of a scene, and the settings that a search found for it, as soon as
 /// they are complete; its error ends the study.
@@ -152,7 +155,7 @@ pub struct RunOutcome {
 pub fn run(
     plan: &StudyPlan,
     progress: &(dyn Fn(Progress) + Sync),
-    finished: &mut dyn FnMut(&[Record], &[FoundBudgets]) -> Result<(), Error>,
+    finished: &mut SceneFinished,
 ) -> Result<Vec<Record>, Error> {
     plan.check()?;
     let (mut records, total) = (Vec::new(), PARTS * plan.scenes.len());
@@ -213,7 +216,8 @@ fn scene_records(
         with_outcome.flat_map(|(&(cell, order), outcome)| rows(plan, cell, order, outcome)).collect();
     let mut records =
         timed_records(plan, &variants, steps, &rows, &|share, what| tell(0.5 + 0.4 * share, what))?;
-    if plan.steps.is_some() {
+    // What was asked for is judged in any case.
+    if plan.steps.is_some() && !plan.only_given {
         leave_out_unseen(&mut records, &variants[0].scene);
     }
     if plan.sweep.is_none() && variants[0].rests() {

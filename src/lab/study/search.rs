@@ -269,7 +269,8 @@ impl SearchJob<'_> {
             records.push(record_of(&plan, &loaded, &row, None, failure));
             works.push(work);
         }
-        if steps.is_some() {
+        let is_last = plan.only_given && steps == self.plan.steps;
+        if steps.is_some() && !is_last {
             leave_out_unseen(&mut records, &loaded.scene);
         }
         let trials = list.iter().zip(records).zip(works);
