@@ -370,7 +370,7 @@ fn data_is_printed_as_json_where_that_is_asked_for() {
     assert_eq!(json(&["run", "stack:2", "--steps", "9", "--json"])["errors"]["steps"], 9);
     assert_eq!(json(&["solvers", "--json"]).as_array().unwrap().len(), VARIANTS.len());
     assert_eq!(json(&["scene", "arch", "--json"])["name"], "arch");
-    assert_eq!(json(&["scene", "--schema"])["title"], "simpulse scene");
+    assert_eq!(json(&["list", "schema"])["title"], "simpulse scene");
     assert!(json(&["columns", "--json"])[0]["columns"].is_array() && json(&["scenes", "--json"]).is_array());
     assert!(json(&["verify", "--list", "--json"]).as_array().unwrap().len() > 50);
     let cells = json(&["verify", "--cases", "A0", "--solvers", "pgs", "--json"]);

@@ -86,7 +86,7 @@ pub struct StudyArgs {
     /// Position sweeps to try, per substep
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     pub position_iterations: Vec<u32>,
-    /// Solver parameters, such as `contact_hertz=60` (`simpulse solvers` lists them)
+    /// Solver parameters, such as `contact_hertz=60` (`simpulse list solvers` lists them)
     #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
     pub set: Vec<Override>,
     /// A curve per solver: one quantity takes several values, all else stays fixed. It is a solver parameter
@@ -99,7 +99,7 @@ pub struct StudyArgs {
     /// friction, second points, rotation and restitution where a scene has none
     #[arg(long, value_name = "all", value_parser = ["all"], conflicts_with = "sweep")]
     pub features: Option<String>,
-    /// Override the scenes' tolerances, such as penetration=5mm,residual=0.05,reference=0.1 (`simpulse scene NAME`
+    /// Override the scenes' tolerances, such as penetration=5mm,residual=0.05,reference=0.1 (`simpulse list NAME`
     /// lists them; that of the reference value has the value's unit)
     #[arg(long, value_delimiter = ',', value_name = "NAME=VALUE,…", value_parser = NonEmptyStringValueParser::new())]
     pub tolerance: Vec<String>,

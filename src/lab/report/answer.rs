@@ -24,7 +24,7 @@ const BUSY: f64 = 0.02;
 /// Description of the columns of the answer.
 const LEGEND: &str = "\
 Good enough (plausible): the scene holds, stands for a minute if it has to rest, and its errors are within the
-tolerances of the scene (`simpulse scene NAME`): pen., penetration (1 cm for bodies of 1 m); res., contact-law residual
+tolerances of the scene (`simpulse list NAME`): pen., penetration (1 cm for bodies of 1 m); res., contact-law residual
 (10 % of the lighter body's weight); ref., distance to the reference value; rest, speed at rest. tight: within 10 % of
 them; exact: within 1 %. µs/step: mean over the run, its median, its longest step. next: the cheapest setting of another
 solver, and how much slower it is; tie: too close to call.

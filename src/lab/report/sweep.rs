@@ -9,7 +9,7 @@ use crate::lab::study::sweep::Swept;
 
 const LEGEND: &str = "\
 A setting is good enough if the scene holds (nothing falls, slides, tunnels or blows up) and its errors are within
-the tolerances of a plausible run (`simpulse scene NAME` lists them with their reasons): penetration, of 99 % of
+the tolerances of a plausible run (`simpulse list NAME` lists them with their reasons): penetration, of 99 % of
 contact points and at rest; the contact-law residual, rms, in weights of the lighter body × step; the distance to
 the scene's reference value (– if none is known); the speed at rest.  Runs were not extended to a minute: later
 failures do not show.  budget: substeps; then velocity, relaxation and position sweeps per substep.
