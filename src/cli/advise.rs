@@ -348,7 +348,7 @@ fn finalists(plan: &SearchPlan, advice: &Advice) -> String {
                 false => format!("{:.1} %", 100.0 * by),
             }),
             error(&|e| si(e.penetration(rests), "m")),
-            error(&|e| ratio(e.law_rms_lighter)),
+            error(&|e| ratio(e.law_rms_lighter())),
             trial
                 .truth
                 .map_or("–".to_string(), |t| t.error.map_or("missed".to_string(), |e| si(e, t.unit))),

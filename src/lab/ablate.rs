@@ -135,8 +135,8 @@ fn on_scene(plan: &AblationPlan, name: &str, without: Without) -> Result<OnScene
     let of = |k: usize, value: f64| (!diverged[k] && value.is_finite()).then_some(value);
     Ok(OnScene {
         scene: name.into(),
-        overlap_m: [0, 1].map(|k| of(k, errors[k].penetration_mean)),
-        rest_speed_m_s: [0, 1].map(|k| of(k, errors[k].rest_velocity)),
+        overlap_m: [0, 1].map(|k| of(k, errors[k].penetration_mean())),
+        rest_speed_m_s: [0, 1].map(|k| of(k, errors[k].rest_velocity())),
         time: times[1] / times[0],
     })
 }

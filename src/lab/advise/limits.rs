@@ -28,8 +28,8 @@ impl Limits {
         let distance = truth.and_then(|t| t.error).unwrap_or(f64::INFINITY);
         let pairs = [
             (errors.penetration(self.rest.is_some()), self.penetration),
-            (errors.law_rms_lighter, self.residual),
-            (errors.rest_velocity, self.rest),
+            (errors.law_rms_lighter(), self.residual),
+            (errors.rest_velocity(), self.rest),
             (distance, self.truth),
         ];
         pairs.into_iter().fold(0.0, |worst: f64, (value, limit)| worst.max(in_limits(value, limit)))
@@ -55,7 +55,8 @@ mod tests {
 
     #[test]
     fn the_worst_limit_counts() {
-        let errors = Errors { held_depth_p99: 2e-3, law_rms_lighter: 0.5, ..Errors::default() };
+        let errors =
+            Errors::default().with("held_depth_p99_m", 2e-3).with("residual_rms_lighter_weights", 0.5);
         let truth = TruthError { quantity: "", unit: "m", expected: 0.0, error: Some(3.0) };
         let limits = Limits { penetration: Some(1e-3), residual: Some(1.0), ..Limits::default() };
         assert_eq!(limits.of_errors(&errors, None), 2.0);

@@ -164,7 +164,7 @@ impl Trial {
             return Some(broken.to_string());
         }
         let errors = self.errors?;
-        let speed = self.later.and_then(|l| l.rest_speed_m_s).unwrap_or(0.0).max(errors.rest_velocity);
+        let speed = self.later.and_then(|l| l.rest_speed_m_s).unwrap_or(0.0).max(errors.rest_velocity());
         let reference = self.truth.and_then(|t| t.error);
         let over = |value: f64, limit: Option<f64>| limit.is_some_and(|limit| value > limit);
         let unit = self.truth.map_or("", |t| t.unit);
@@ -175,8 +175,8 @@ impl Trial {
                 format!("{} of penetration", si(errors.penetration(limits.rest.is_some()), "m")),
             ),
             (
-                over(errors.law_rms_lighter, limits.residual),
-                format!("residual {}", ratio(errors.law_rms_lighter)),
+                over(errors.law_rms_lighter(), limits.residual),
+                format!("residual {}", ratio(errors.law_rms_lighter())),
             ),
             (
                 limits.truth.is_some() && reference.is_none_or(|e| over(e, limits.truth)),
@@ -371,7 +371,7 @@ fn excess(limits: &Limits, trial: &Trial) -> f64 {
     if let Some(later) = &trial.later {
         let rest = later.rest_speed_m_s.filter(|_| later.broken.is_none());
         let Some(speed) = rest else { return f64::INFINITY };
-        let errors = Errors { rest_velocity: speed.max(errors.rest_velocity), ..*errors };
+        let errors = errors.with("rest_speed_m_s", speed.max(errors.rest_velocity()));
         return limits.of_errors(&errors, trial.truth.as_ref()).max(limits.of_time(trial.time_ns()));
     }
     limits.of_errors(errors, trial.truth.as_ref()).max(limits.of_time(trial.time_ns()))

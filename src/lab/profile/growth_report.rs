@@ -28,9 +28,12 @@ pub fn text(rows: &[SizeRow], verdicts: &[GrowthVerdict]) -> String {
         let each = [row.step.ns, row.step.mean_ns, row.step.longest_ns, row.step.spread_ns];
         cells.extend(each.map(|ns| digits(ns / row.counts.contacts.max(1) as f64)));
         cells.extend(phases.iter().map(|&p| digits(row.per_contact(row.phases[p as usize]))));
-        cells.push(row.errors.map_or("–".into(), |e| si(e.penetration_max, "m")));
-        cells.push(row.errors.map_or("–".into(), |e| ratio(e.law_rms)));
-        cells.push(row.errors.map_or("–".into(), |e| ratio(e.law_rms_body)));
+        cells.push(row.errors.map_or("–".into(), |e| si(e.penetration_max(), "m")));
+        cells.push(
+            row.errors
+                .map_or("–".into(), |e| ratio(e.get("residual_rms_scene_weights").unwrap_or_default())),
+        );
+        cells.push(row.errors.map_or("–".into(), |e| ratio(e.law_rms_body())));
         times.add_row(cells);
     }
     let mut text = format!(
@@ -163,7 +166,8 @@ pub fn csv(rows: &[SizeRow]) -> Result<Vec<u8>, Error> {
         let error = |of: fn(&crate::lab::metrics::Errors) -> f64| {
             row.errors.as_ref().map_or(String::new(), |e| of(e).to_string())
         };
-        record.extend([error(|e| e.penetration_max), error(|e| e.law_rms), error(|e| e.law_rms_body)]);
+        let scene = error(|e| e.get("residual_rms_scene_weights").unwrap_or_default());
+        record.extend([error(|e| e.penetration_max()), scene, error(|e| e.law_rms_body())]);
         writer.write_record(&record).map_err(failed)?;
     }
     writer.into_inner().map_err(|e| Error::invalid("growth.csv", e.to_string()))

@@ -96,7 +96,7 @@ impl Recorder {
         self.meter.observe(world);
         let errors = self.meter.errors();
         self.meter = Observation::new(world);
-        self.frame(world, [errors.penetration_max, errors.law_rms_body, errors.rest_velocity]);
+        self.frame(world, [errors.penetration_max(), errors.law_rms_body(), errors.rest_velocity()]);
         if self.frames.len() > LARGEST / 2 {
             let size = self.frames.len() >> 20;
             let message = format!("{size} MiB by step {}; record fewer frames with --every", self.steps);

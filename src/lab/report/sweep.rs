@@ -145,7 +145,7 @@ fn row(record: &Record) -> Vec<String> {
         sample.map_or_else(nothing, |l| digits(l.worst_ns / 1e3)),
         sample.map_or_else(nothing, |l| digits(l.spread_ns / 1e3)),
         errors.map_or_else(nothing, |e| si(e.penetration(record.tolerances.rest.is_some()), "m")),
-        errors.map_or_else(nothing, |e| ratio(e.law_rms_lighter)),
+        errors.map_or_else(nothing, |e| ratio(e.law_rms_lighter())),
         match record.truth {
             None => nothing(),
             Some(t) => t.error.map_or("missed".to_string(), |e| si(e, t.unit)),

@@ -49,7 +49,7 @@ pub fn later(loaded: &Loaded, settings: Settings) -> Result<Later, Error> {
             observation.observe(&world);
         }
     }
-    later.rest_speed_m_s = observation.map(|o| o.errors().rest_velocity);
+    later.rest_speed_m_s = observation.map(|o| o.errors().rest_velocity());
     Ok(later)
 }
 
