@@ -311,7 +311,7 @@ fn a_sweep_leaves_a_curve_per_solver() {
     let values: Vec<f64> = study.records.iter().filter_map(|r| Some(r.swept?.value)).collect();
     assert_eq!(values, [15.0, 15.0, 30.0, 30.0, 60.0, 60.0]);
     // A softer contact sags more.
-    let depth = |i: usize| study.records[i].errors.unwrap().penetration_max;
+    let depth = |i: usize| study.records[i].errors.unwrap().penetration_max();
     assert!(depth(0) > depth(2), "{} {}", depth(0), depth(2));
 
     // The step changes, the duration does not.

@@ -364,7 +364,7 @@ fn compared(answer: &Answer, records: &[Record], max_ns: f64) -> String {
             longest,
             slower,
             record.errors.map_or_else(nothing, |e| si(e.penetration(rests), "m")),
-            record.errors.map_or_else(nothing, |e| ratio(e.law_rms_lighter)),
+            record.errors.map_or_else(nothing, |e| ratio(e.law_rms_lighter())),
             record.truth.map_or_else(nothing, |t| t.error.map_or("missed".into(), |e| si(e, t.unit))),
             if is_met { "met".into() } else { why_not(record, max_ns) },
         ]);

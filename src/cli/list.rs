@@ -139,7 +139,7 @@ fn columns(args: &ListArgs) -> Result<ExitCode, Error> {
     let sheet = |s: &&Sheet| {
         json!({
             "file": s.file, "command": s.command, "line": s.line,
-            "columns": s.columns.iter().map(column).collect::<Vec<_>>(),
+            "columns": (s.columns)().iter().map(column).collect::<Vec<_>>(),
         })
     };
     match args.json {

@@ -277,9 +277,9 @@ impl RunResult {
         };
         let holds = self.broken.map_or(yes.to_string(), |broken| broken.mark.word().to_string());
         let when = self.broken.map_or(String::new(), |broken| format!("at step {}", broken.step));
-        let joints = e.joint_gap_rms.map_or(String::new(), |rms| {
-            let [gap, lean, excess] =
-                [e.joint_gap_max, e.joint_lean_max, e.joint_excess_max].map(Option::unwrap_or_default);
+        let joints = e.get("joint_gap_rms_m").map_or(String::new(), |rms| {
+            let [gap, lean, excess] = ["joint_gap_max_m", "joint_lean_max_rad", "joint_excess_max"]
+                .map(|name| e.get(name).unwrap_or_default());
             let mut rest = format!("greatest {}", si(gap, "m"));
             if lean > 0.0 {
                 rest += &format!("; held angles {}", si(lean, "rad"));
@@ -307,21 +307,25 @@ impl RunResult {
                 si(e.penetration(self.rests), "m"),
                 format!(
                     "greatest {}; {} when first found",
-                    si(e.penetration_max, "m"),
-                    si(e.flight_depth_max, "m")
+                    si(e.penetration_max(), "m"),
+                    si(e.get("flight_depth_max_m").unwrap_or_default(), "m")
                 ),
             ),
             joints,
             line(
                 "contact-law residual, rms",
-                ratio(e.law_rms_lighter),
+                ratio(e.law_rms_lighter()),
                 "weights of the lighter body × step".into(),
             ),
             reference,
             "behavior\n".to_string(),
             line("holds", holds, when),
-            line("residual speed, last second", si(e.rest_velocity, "m/s"), "rms".into()),
-            line("energy change", ratio(e.energy_change), "relative; positive is a gain".into()),
+            line("residual speed, last second", si(e.rest_velocity(), "m/s"), "rms".into()),
+            line(
+                "energy change",
+                ratio(e.get("energy_change").unwrap_or_default()),
+                "relative; positive is a gain".into(),
+            ),
         ]
         .concat()
             + &unchecked

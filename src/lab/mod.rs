@@ -24,7 +24,7 @@
 //!     let impulses = world.contacts.iter().map(|c| c.step_impulse[0][0] + c.step_impulse[1][0]);
 //!     highest_load = highest_load.max(impulses.sum::<f32>() / world.settings.dt);
 //! }
-//! assert!(observation.errors().penetration_max < 0.02 && highest_load > 0.0);
+//! assert!(observation.errors().penetration_max() < 0.02 && highest_load > 0.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

@@ -136,7 +136,7 @@ fn piles_that_begin_at_rest_create_no_energy() {
             world.step().unwrap();
             observation.observe(&world);
         }
-        let created = observation.errors().energy_created;
+        let created = observation.errors().get("energy_created").unwrap();
         println!("{name}: {created:.1e} of the energy in the worst step");
         assert!(created < 3e-6, "{name}: {created}");
     }

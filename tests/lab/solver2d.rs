@@ -114,7 +114,7 @@ fn measured(name: &str, (_, solver, budget, set): Pairing, n: u32) -> Option<Fig
         x.hypot(y)
     });
     let drift = drifts.fold(0.0, f64::max);
-    Some(Figures { mean: 1e3 * errors.penetration_mean, greatest: 1e3 * errors.penetration_max, drift })
+    Some(Figures { mean: 1e3 * errors.penetration_mean(), greatest: 1e3 * errors.penetration_max(), drift })
 }
 
 fn row(solver: &str) -> Pairing {

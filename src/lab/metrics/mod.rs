@@ -19,8 +19,8 @@
 //!
 //! A run that blows up ([`Observation::blown_up`]) has failed, and has no errors.
 //!
-//! A new metric is a field of [`Errors`], a sum in [`Observation`] and a column of the report. Outside the crate it is a
-//! function of a world:
+//! A new metric is an entry of [`METRICS`], and a sum in [`Observation`] if it needs one. Columns of `study.csv`, keys
+//! of JSON files, the lines of `run --all` and of `list columns` follow. Outside the crate it is a function of a world:
 //!
 //! ```
 //! use simpulse::engine::world::{Settings, World};
@@ -51,6 +51,7 @@ pub mod own;
 pub mod rest;
 pub mod softness;
 pub mod state;
+pub mod table;
 pub mod velocity;
 pub mod violation;
 
@@ -59,7 +60,7 @@ use crate::engine::contacts::{Contact, pair_key};
 use crate::engine::params::RESTITUTION_THRESHOLD;
 use crate::engine::world::{Criterion, Divergence, Quantity, World};
 use balance::{Balance, ratio, weight};
-use distribution::Distribution;
+use distribution::{Distribution, Sum};
 use glam::{DVec2, Vec2};
 use joints::{Given, JointErrors};
 use law::{BodyStep, PointStep};
@@ -68,174 +69,12 @@ use rest::Rest;
 use softness::{Depths, RestDepths};
 use state::BodyState;
 use std::collections::BTreeMap;
+pub use table::{Errors, METRICS, Metric};
 use violation::Violation;
-
-/// The errors of a run. All are finite, and zero if there is nothing to measure. An error is `None` if it was
-/// not requested or has no meaning.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Errors {
-    /// Steps observed.
-    pub steps: u64,
-    /// Points within contact distance after a step, over all steps.
-    pub points: u64,
-    /// Deepest overlap (m).
-    #[serde(rename = "penetration_max_m")]
-    pub penetration_max: f64,
-    /// Mean overlap of these points; gaps count as zero (m).
-    #[serde(rename = "penetration_mean_m")]
-    pub penetration_mean: f64,
-    /// Root mean square of these overlaps (m).
-    #[serde(rename = "penetration_rms_m")]
-    pub penetration_rms: f64,
-    /// 99th percentile of these overlaps (m).
-    #[serde(rename = "penetration_p99_m")]
-    pub penetration_p99: f64,
-    /// Largest overlap at the end of a step between bodies that had no contact in it (m): no solver could
-    /// prevent it.
-    #[serde(rename = "flight_depth_max_m")]
-    pub flight_depth_max: f64,
-    /// 99th percentile of the overlap beyond the depth at which its contact was first found (m).
-    #[serde(rename = "held_depth_p99_m")]
-    pub held_depth_p99: f64,
-    /// Deepest overlap of the last second (m).
-    #[serde(rename = "rest_depth_max_m")]
-    pub rest_depth_max: f64,
-    /// Deepest overlap, as a fraction of half the width of the thinnest dynamic shape.
-    pub penetration_relative: f64,
-    /// Deepest overlap of the last second beyond the static deflection of the soft contacts (m); `None`
-    /// without soft contacts.
-    #[serde(rename = "penetration_excess_m")]
-    pub penetration_excess: Option<f64>,
-    /// Largest static deflection of soft contacts under the load of the last second (m).
-    #[serde(rename = "soft_floor_m")]
-    pub soft_floor: Option<f64>,
-    /// Root mean square of the normal law residual, as a multiple of scene weight × step.
-    #[serde(rename = "residual_normal_rms")]
-    pub law_normal_rms: f64,
-    /// Largest normal law residual.
-    #[serde(rename = "residual_normal_max")]
-    pub law_normal_max: f64,
-    /// Root mean square of the tangential law residual.
-    #[serde(rename = "residual_tangent_rms")]
-    pub law_tangent_rms: f64,
-    /// Largest tangential law residual.
-    #[serde(rename = "residual_tangent_max")]
-    pub law_tangent_max: f64,
-    /// Root mean square of both parts together. At equal quality it falls with the number of bodies.
-    #[serde(rename = "residual_rms_scene_weights")]
-    pub law_rms: f64,
-    /// The same as a multiple of a body's mean weight × step, which does not fall with the number of bodies.
-    #[serde(rename = "residual_rms_body_weights")]
-    pub law_rms_body: f64,
-    /// Root mean square of both parts together, each point's residual as a multiple of the weight of the
-    /// lighter of its two bodies × step.
-    #[serde(rename = "residual_rms_lighter_weights")]
-    pub law_rms_lighter: f64,
-    /// Largest violation of complementarity, as a multiple of (weight × step)²/mass.
-    pub complementarity: f64,
-    /// Largest violation of the friction cone, as a multiple of weight × step.
-    pub cone: f64,
-    /// Largest gap to maximal dissipation, as a multiple of (weight × step)²/mass.
-    pub dissipation: f64,
-    /// Root mean square of the residual of the solver's own law, both parts, as a multiple of scene weight ×
-    /// substep; only with `Settings::observe_rule`.
-    #[serde(rename = "own_residual_rms")]
-    pub own_rms: Option<f64>,
-    /// Largest normal or tangential part of that residual.
-    #[serde(rename = "own_residual_max")]
-    pub own_max: Option<f64>,
-    /// Momentum imbalance, see [`Balance::close`].
-    pub momentum: f64,
-    /// Angular momentum imbalance.
-    pub angular_momentum: f64,
-    /// Energy gained (positive) or lost over the run.
-    pub energy_change: f64,
-    /// Largest energy created in one step.
-    pub energy_created: f64,
-    /// Energy that springs and motors of joints gave over the run; `None` without joints.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub joint_work: Option<f64>,
-    /// Largest gap of a joint (m); `None` without joints.
-    #[serde(rename = "joint_gap_max_m", skip_serializing_if = "Option::is_none", default)]
-    pub joint_gap_max: Option<f64>,
-    /// Root mean square of the gaps of all joints and steps (m).
-    #[serde(rename = "joint_gap_rms_m", skip_serializing_if = "Option::is_none", default)]
-    pub joint_gap_rms: Option<f64>,
-    /// Largest error of an angle that is held by a joint (rad).
-    #[serde(rename = "joint_lean_max_rad", skip_serializing_if = "Option::is_none", default)]
-    pub joint_lean_max: Option<f64>,
-    /// Largest violation of a joint's limits (m or rad).
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub joint_excess_max: Option<f64>,
-    /// Root mean square of the law residual of joint rows, as a multiple of the lighter body's weight × step;
-    /// see [`joints`].
-    #[serde(rename = "joint_residual_rms_lighter_weights", skip_serializing_if = "Option::is_none", default)]
-    pub joint_law_rms: Option<f64>,
-    /// Largest law residual of a joint row.
-    #[serde(rename = "joint_residual_max_lighter_weights", skip_serializing_if = "Option::is_none", default)]
-    pub joint_law_max: Option<f64>,
-    /// Largest speed error of a motor whose impulse is below its cap (m/s or rad/s).
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub joint_motor_miss_max: Option<f64>,
-    /// Largest fraction of its cap that a motor used.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub joint_motor_load_max: Option<f64>,
-    /// Energy that springs gave over the run; negative if they removed energy.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub joint_spring_work: Option<f64>,
-    /// Energy that motors gave over the run.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub joint_motor_work: Option<f64>,
-    /// Energy that limits gave over the run; negative if they stopped bodies.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub joint_limit_work: Option<f64>,
-    /// Energy dissipated by friction.
-    pub friction_loss: f64,
-    /// Energy dissipated by normal impulses.
-    pub impact_loss: f64,
-    /// Largest energy gain of one step that no impulse explains.
-    pub energy_unexplained: f64,
-    /// Root mean square of √(2 E_kin/M) over the last second (m/s).
-    #[serde(rename = "rest_speed_m_s")]
-    pub rest_velocity: f64,
-    /// Magnitude of the fastest creep of one body on another over the last second (m/s).
-    #[serde(rename = "creep_m_s")]
-    pub creep: f64,
-    /// Half the width of the 95 % interval of the creep (m/s).
-    #[serde(rename = "creep_half_width_m_s")]
-    pub creep_half_width: f64,
-    /// Time at which the scene came to rest (s); `None` if it never did.
-    #[serde(rename = "settled_s")]
-    pub settled: Option<f64>,
-}
-
-impl Errors {
-    /// The penetration by which a run is judged (m): [`Self::held_depth_p99`], or, in a scene that must come
-    /// to rest, the larger of it and [`Self::rest_depth_max`].
-    pub fn penetration(&self, rests: bool) -> f64 {
-        if rests { self.held_depth_p99.max(self.rest_depth_max) } else { self.held_depth_p99 }
-    }
-}
 
 /// Time after which an overlap from flight counts in full (s): in 30 steps, a Baumgarte feedback of a fifth
 /// per step reduces it to a thousandth.
 const FLIGHT: f64 = 0.5;
-
-/// Root mean square and maximum of residuals (N·s).
-#[derive(Clone, Copy, Debug, Default)]
-struct Residuals {
-    sum_of_squares: f64,
-    max: f64,
-    count: u64,
-}
-
-impl Residuals {
-    fn add(&mut self, residual: f64) {
-        self.count += 1;
-        self.sum_of_squares += residual * residual;
-        self.max = self.max.max(residual.abs());
-    }
-}
 
 /// Observes a world step by step and accumulates its errors.
 ///
@@ -252,7 +91,7 @@ impl Residuals {
 ///     observation.observe(&world);
 /// }
 /// let errors = observation.errors();
-/// assert!(errors.penetration_max < 0.01 && errors.law_rms_body < 0.1);
+/// assert!(errors.penetration_max() < 0.01 && errors.law_rms_body() < 0.1);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -268,15 +107,16 @@ pub struct Observation {
     steps: u64,
     overlaps: Overlaps,
     penetration: Distribution,
-    normal: Residuals,
-    tangent: Residuals,
-    /// Residuals as multiples of the lighter body's weight × step (1).
-    lighter: Residuals,
+    normal: Sum,
+    tangent: Sum,
+    /// Sum as multiples of the lighter body's weight × step (1).
+    lighter: Sum,
     held: Distribution,
     /// Overlaps from flight, first found without a contact: depth (m) and step, by shape pair.
     flights: BTreeMap<u64, (f64, u64)>,
     flight_max: f64,
-    own: [Residuals; 2],
+    /// Residuals of the solver's own law, both parts together (N·s).
+    own: Sum,
     violation: Violation,
     largest_impulse: f64,
     rest: Rest,
@@ -313,13 +153,13 @@ impl Observation {
             steps: 0,
             overlaps: Overlaps::default(),
             penetration: Distribution::default(),
-            normal: Residuals::default(),
-            tangent: Residuals::default(),
-            lighter: Residuals::default(),
+            normal: Sum::default(),
+            tangent: Sum::default(),
+            lighter: Sum::default(),
             held: Distribution::default(),
             flights: BTreeMap::new(),
             flight_max: 0.0,
-            own: Default::default(),
+            own: Sum::default(),
             violation: Violation::default(),
             largest_impulse: 0.0,
             rest: Rest::new(settings.dt as f64),
@@ -354,8 +194,8 @@ impl Observation {
             self.violation = self.violation.max(point.violation(&bodies[*a], &bodies[*b], self.dt));
             self.largest_impulse = self.largest_impulse.max(point.impulse[0]);
         }
-        for residual in own::residuals(world, &bodies, &points) {
-            self.own.iter_mut().zip(residual).for_each(|(sum, r)| sum.add(r));
+        for [normal, tangent] in own::residuals(world, &bodies, &points) {
+            self.own.add(normal.hypot(tangent));
         }
         let given = Given::of(world, &bodies, |body| self.balance.acts_at(body));
         self.balance.add(&bodies, &points, &given);
@@ -443,75 +283,49 @@ impl Observation {
     }
 
     /// The errors of the steps so far.
-    ///
-    /// Residuals are relative to Σ m g Δt, the impulse that carries the whole scene for a step; without
-    /// gravity, to the largest impulse of any point.
     pub fn errors(&self) -> Errors {
-        let unit = if self.weight > 0.0 { self.weight * self.dt } else { self.largest_impulse };
-        let energy_unit = ratio(unit * unit, self.balance.mass());
-        let rms = |sum: f64, count: u64, unit: f64| ratio((sum / count.max(1) as f64).sqrt(), unit);
-        let count = self.normal.count;
-        let [normal, tangent] = [self.normal, self.tangent].map(|r| r.sum_of_squares);
-        let own_unit = unit / self.substeps;
-        let own = (self.own[0].count > 0).then_some(&self.own);
-        let own_squares = |o: &[Residuals; 2]| o[0].sum_of_squares + o[1].sum_of_squares;
-        let touched = self.penetration.count() > 0;
-        let depths = self.softness.filter(|_| touched).map(|_| self.depths.largest());
-        let balance = self.balance.close();
-        let creep = self.rest.creep();
-        let work = self.joints.work.map(|work| ratio(work, self.balance.energy_scale()));
-        Errors {
-            steps: self.steps,
-            points: self.penetration.count(),
-            penetration_max: self.penetration.max(),
-            penetration_mean: self.penetration.mean(),
-            penetration_rms: self.penetration.rms(),
-            penetration_p99: self.penetration.p99(),
-            flight_depth_max: self.flight_max,
-            held_depth_p99: self.held.p99(),
-            rest_depth_max: self.depths.largest().penetration,
-            penetration_relative: ratio(self.penetration.max(), self.half_extent),
-            penetration_excess: depths.map(|d| d.excess),
-            soft_floor: depths.map(|d| d.floor),
-            law_normal_rms: rms(normal, count, unit),
-            law_normal_max: ratio(self.normal.max, unit),
-            law_tangent_rms: rms(tangent, count, unit),
-            law_tangent_max: ratio(self.tangent.max, unit),
-            law_rms: rms(normal + tangent, count, unit),
-            law_rms_body: rms(normal + tangent, count, unit / self.heavy.max(1) as f64),
-            law_rms_lighter: match self.lighter.count {
-                0 => rms(normal + tangent, count, unit / self.heavy.max(1) as f64),
-                count => rms(self.lighter.sum_of_squares, count, 1.0),
-            },
-            complementarity: ratio(self.violation.complementarity, energy_unit),
-            cone: ratio(self.violation.cone, unit),
-            dissipation: ratio(self.violation.dissipation, energy_unit),
-            own_rms: own.map(|o| rms(own_squares(o), o[0].count, own_unit)),
-            own_max: own.map(|o| ratio(o[0].max.max(o[1].max), own_unit)),
-            momentum: balance.momentum,
-            angular_momentum: balance.angular_momentum,
-            energy_change: balance.energy_change,
-            energy_created: balance.energy_created,
-            joint_work: self.joints.gap_rms().map(|_| balance.joint_work),
-            joint_gap_max: self.joints.gap_rms().map(|_| self.joints.gap_max),
-            joint_gap_rms: self.joints.gap_rms(),
-            joint_lean_max: self.joints.gap_rms().map(|_| self.joints.lean_max),
-            joint_excess_max: self.joints.gap_rms().map(|_| self.joints.excess_max),
-            joint_law_rms: self.joints.residual().map(|r| r[0]),
-            joint_law_max: self.joints.residual().map(|r| r[1]),
-            joint_motor_miss_max: self.joints.gap_rms().map(|_| self.joints.motor_miss_max),
-            joint_motor_load_max: self.joints.gap_rms().map(|_| self.joints.motor_load_max),
-            joint_spring_work: self.joints.gap_rms().map(|_| work[0]),
-            joint_motor_work: self.joints.gap_rms().map(|_| work[1]),
-            joint_limit_work: self.joints.gap_rms().map(|_| work[2]),
-            friction_loss: balance.friction_loss,
-            impact_loss: balance.impact_loss,
-            energy_unexplained: balance.energy_unexplained,
-            rest_velocity: self.rest.speed(),
-            creep: creep.speed.abs(),
-            creep_half_width: creep.half_width,
-            settled: self.rest.settled(),
-        }
+        Errors::of(self, self.steps, self.penetration.count())
+    }
+
+    /// The unit of residuals (N·s): Σ m g Δt, the impulse that carries the whole scene for a step; without
+    /// gravity, the largest impulse of any point.
+    fn unit(&self) -> f64 {
+        if self.weight > 0.0 { self.weight * self.dt } else { self.largest_impulse }
+    }
+
+    /// The unit of residual energies (J): (weight × step)²/mass.
+    fn energy_unit(&self) -> f64 {
+        ratio(self.unit() * self.unit(), self.balance.mass())
+    }
+
+    /// The unit of residuals (N·s) that does not grow with the number of bodies: a body's mean weight × step.
+    fn body_unit(&self) -> f64 {
+        self.unit() / self.heavy.max(1) as f64
+    }
+
+    /// Root mean square of the law residual, both parts together (N·s).
+    fn residual_rms(&self) -> f64 {
+        self.normal.rms_with(&self.tangent)
+    }
+
+    /// The law residual of the solver as a multiple of weight × substep; `None` if it was not observed.
+    fn own(&self, of: fn(&Sum) -> f64) -> Option<f64> {
+        (self.own.count > 0).then(|| ratio(of(&self.own), self.unit() / self.substeps))
+    }
+
+    /// Depths of the last second; `None` without soft contacts.
+    fn soft_depths(&self) -> Option<Depths> {
+        self.softness.filter(|_| self.penetration.count() > 0).map(|_| self.depths.largest())
+    }
+
+    /// An error of joints; `None` without joints.
+    fn joint(&self, of: fn(&JointErrors) -> f64) -> Option<f64> {
+        (self.joints.gap.count > 0).then(|| of(&self.joints))
+    }
+
+    /// The work of springs, motors or limits, relative to the scale of [`Balance::close`]; `None` without joints.
+    fn joint_work(&self, of: fn(&JointErrors) -> f64) -> Option<f64> {
+        self.joint(of).map(|work| ratio(work, self.balance.energy_scale()))
     }
 }
 

@@ -111,7 +111,7 @@ impl Recorder {
         self.meter.observe(world);
         let errors = self.meter.errors();
         self.meter = Observation::new(world);
-        self.frame(world, [errors.penetration_max, errors.law_rms_body, errors.rest_velocity]);
+        self.frame(world, [errors.penetration_max(), errors.law_rms_body(), errors.rest_velocity()]);
         if self.count > LARGEST {
             let message =
                 format!("{LARGEST} numbers by step {}; record fewer frames with --every", self.steps);

@@ -151,7 +151,7 @@ fn row(record: &Record) -> Vec<String> {
             .map_or_else(nothing, |l| digits(l.mean_ns / l.load.contacts)),
         sample.map_or_else(nothing, |l| digits(l.load.bytes_per_contact)),
         errors.map_or_else(nothing, |e| si(e.penetration(record.tolerances.rest.is_some()), "m")),
-        errors.map_or_else(nothing, |e| ratio(e.law_rms_lighter)),
+        errors.map_or_else(nothing, |e| ratio(e.law_rms_lighter())),
         match record.truth {
             None => nothing(),
             Some(t) => t.error.map_or("missed".to_string(), |e| si(e, t.unit)),

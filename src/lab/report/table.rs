@@ -145,12 +145,12 @@ fn row(record: &Record) -> Vec<String> {
     cells.extend([
         record.mark().map_or("yes", |mark| mark.word()).to_string(),
         error(&|e| si(e.penetration(record.tolerances.rest.is_some()), "m")),
-        error(&|e| si(e.penetration_max, "m")),
-        error(&|e| ratio(e.law_rms_lighter)),
-        error(&|e| ratio(e.law_rms_body)),
-        error(&|e| ratio(e.energy_change)),
-        error(&|e| ratio(e.momentum)),
-        error(&|e| si(e.rest_velocity, "m/s")),
+        error(&|e| si(e.penetration_max(), "m")),
+        error(&|e| ratio(e.law_rms_lighter())),
+        error(&|e| ratio(e.law_rms_body())),
+        error(&|e| ratio(e.get("energy_change").unwrap_or_default())),
+        error(&|e| ratio(e.get("momentum").unwrap_or_default())),
+        error(&|e| si(e.rest_velocity(), "m/s")),
     ]);
     let reference = |t: TruthError| t.error.map_or("missed".to_string(), |e| si(e, t.unit));
     cells.push(record.truth.map_or(NOTHING.to_string(), reference));
@@ -195,71 +195,21 @@ pub fn error_line(errors: Option<&Errors>) -> String {
         Some(e) => format!(
             "errors of the last {} steps: penetration {} maximum, {} mean; law residual {} of the scene's weight, {} of a body's\n",
             e.steps,
-            si(e.penetration_max, "m"),
-            si(e.penetration_mean, "m"),
-            ratio(e.law_rms),
-            ratio(e.law_rms_body)
+            si(e.penetration_max(), "m"),
+            si(e.penetration_mean(), "m"),
+            ratio(e.get("residual_rms_scene_weights").unwrap_or_default()),
+            ratio(e.law_rms_body())
         ),
         None => "errors: none observed, since no step was taken\n".to_string(),
     }
 }
 
-/// The errors of one run, one per line. Errors that do not exist are left out.
+/// The errors of one run, a line each with name, value and meaning. Errors that do not exist are left out.
 pub fn error_list(errors: &Errors) -> String {
-    let e = errors;
-    let length = |value: f64| si(value, "m");
-    let lines = [
-        ("penetration max", Some(length(e.penetration_max))),
-        ("penetration mean", Some(length(e.penetration_mean))),
-        ("penetration rms", Some(length(e.penetration_rms))),
-        ("penetration 99 %", Some(length(e.penetration_p99))),
-        ("penetration held, 99 %", Some(length(e.held_depth_p99))),
-        ("penetration at rest, max", Some(length(e.rest_depth_max))),
-        ("overlap before a contact was found, max", Some(length(e.flight_depth_max))),
-        ("penetration max / half-extent", Some(ratio(e.penetration_relative))),
-        ("static deflection of soft contacts, last second", e.soft_floor.map(length)),
-        ("penetration beyond the deflection", e.penetration_excess.map(length)),
-        ("law residual, rms, lighter weights", Some(ratio(e.law_rms_lighter))),
-        ("law residual, rms, body weights", Some(ratio(e.law_rms_body))),
-        ("law residual, rms, scene weights", Some(ratio(e.law_rms))),
-        ("law residual, normal, rms", Some(ratio(e.law_normal_rms))),
-        ("law residual, normal, max", Some(ratio(e.law_normal_max))),
-        ("law residual, tangential, rms", Some(ratio(e.law_tangent_rms))),
-        ("law residual, tangential, max", Some(ratio(e.law_tangent_max))),
-        ("complementarity violated, max", Some(ratio(e.complementarity))),
-        ("friction cone violated, max", Some(ratio(e.cone))),
-        ("gap to maximal dissipation, max", Some(ratio(e.dissipation))),
-        ("residual of its own law, rms", e.own_rms.map(ratio)),
-        ("residual of its own law, max", e.own_max.map(ratio)),
-        ("momentum out of balance", Some(ratio(e.momentum))),
-        ("angular momentum out of balance", Some(ratio(e.angular_momentum))),
-        ("energy change", Some(ratio(e.energy_change))),
-        ("energy created, worst step", Some(ratio(e.energy_created))),
-        ("energy unexplained, worst step", Some(ratio(e.energy_unexplained))),
-        ("energy taken by friction", Some(ratio(e.friction_loss))),
-        ("energy taken by normal impulses", Some(ratio(e.impact_loss))),
-        ("joint gap, rms", e.joint_gap_rms.map(length)),
-        ("joint gap, max", e.joint_gap_max.map(length)),
-        ("joint angles off, max", e.joint_lean_max.map(|lean| si(lean, "rad"))),
-        ("joints beyond limits, max", e.joint_excess_max.map(|excess| si(excess, "m or rad"))),
-        ("joint law residual, rms, lighter weights", e.joint_law_rms.map(ratio)),
-        ("joint law residual, max", e.joint_law_max.map(ratio)),
-        ("speed that a motor misses, max", e.joint_motor_miss_max.map(|miss| si(miss, "m/s or rad/s"))),
-        ("impulse of a motor / its cap, max", e.joint_motor_load_max.map(ratio)),
-        ("energy given by springs and motors", e.joint_work.map(ratio)),
-        ("energy given by springs", e.joint_spring_work.map(ratio)),
-        ("energy given by motors", e.joint_motor_work.map(ratio)),
-        ("energy given by limits", e.joint_limit_work.map(ratio)),
-        ("rest velocity, last second", Some(si(e.rest_velocity, "m/s"))),
-        (
-            "creep, last second, with 95 %",
-            Some(format!("{} ± {}", si(e.creep, "m/s"), si(e.creep_half_width, "m/s"))),
-        ),
-        ("settled after", Some(e.settled.map_or("never".to_string(), |t| si(t, "s")))),
-    ];
-    let shown = lines.into_iter().filter_map(|(name, value)| Some((name, value?)));
-    shown.map(|(name, value)| format!("  {name:<36}{value:>12}\n")).collect()
+    let shown = errors.iter().filter_map(|(metric, value)| Some((metric, si(value?, metric.unit))));
+    shown.map(|(metric, value)| format!("  {:<36}{value:>12}  {}\n", metric.name, metric.meaning)).collect()
 }
+
 #[cfg(test)]
 mod tests {
     use super::*;

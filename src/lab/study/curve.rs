@@ -56,11 +56,11 @@ impl ErrorAxis {
     pub fn of(self, record: &Record) -> Option<f64> {
         match self {
             ErrorAxis::Penetration => Some(record.errors?.penetration(record.tolerances.rest.is_some())),
-            ErrorAxis::Law => Some(record.errors?.law_rms_lighter),
+            ErrorAxis::Law => Some(record.errors?.law_rms_lighter()),
             ErrorAxis::Truth => record.truth?.error,
             ErrorAxis::Rest => {
                 // The extended run of a minute is more reliable than the short run: unrest grows with time.
-                let run = record.errors?.rest_velocity;
+                let run = record.errors?.rest_velocity();
                 Some(record.later.and_then(|later| later.rest_speed_m_s).unwrap_or(run))
             }
         }

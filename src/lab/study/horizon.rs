@@ -33,7 +33,7 @@ pub fn later(loaded: &Loaded, settings: Settings) -> Result<Later, Error> {
     let found = trial.run(&mut |_| Ok(()))?;
     let diverged = found.failure.map(|d| Broken { mark: Mark::BlewUp, step: d.step, body: Some(d.body) });
     let broken = diverged.or(found.broken);
-    let rest_speed_m_s = found.errors.filter(|_| broken.is_none()).map(|e| e.rest_velocity);
+    let rest_speed_m_s = found.errors.filter(|_| broken.is_none()).map(|e| e.rest_velocity());
     Ok(Later { steps, seconds: steps as f64 * scene.dt, broken, rest_speed_m_s })
 }
 

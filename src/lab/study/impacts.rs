@@ -84,7 +84,7 @@ mod tests {
     fn a_gain_is_of_settings_that_ran_with_both() {
         let with = |impacts, substeps, time, residual| {
             let mut own = Record { impacts, ..record(8, substeps, time, 1e-3) };
-            own.errors = Some(Errors { law_rms_lighter: residual, ..Errors::default() });
+            own.errors = Some(Errors::default().with("residual_rms_lighter_weights", residual));
             own
         };
         let (own, waves) = (Impacts::Own, Impacts::Waves);

@@ -352,11 +352,11 @@ pub(crate) mod tests {
             swept: None,
             sample: Some(sample),
             speed_up: None,
-            errors: Some(Errors {
-                penetration_max: penetration,
-                held_depth_p99: penetration,
-                ..Errors::default()
-            }),
+            errors: Some(
+                Errors::default()
+                    .with("penetration_max_m", penetration)
+                    .with("held_depth_p99_m", penetration),
+            ),
             truth: None,
             tolerances: tolerances(),
             broken: None,
@@ -413,7 +413,7 @@ pub(crate) mod tests {
         let good = |r: &Record| Accuracy::ALL.map(|a| r.is_good(a));
         assert_eq!((good(&record), record.fails_later()), ([true, true, false], None));
         record.tolerances.rest = Some(crate::lab::scenes::tolerance::Tolerance::new(5e-3, "x"));
-        record.errors.as_mut().unwrap().rest_velocity = 1e-3;
+        record.errors = record.errors.map(|e| e.with("rest_speed_m_s", 1e-3));
         assert_eq!(good(&record), [true, false, false]);
         let later = Later { steps: 3600, seconds: 60.0, broken: None, rest_speed_m_s: Some(36e-3) };
         record.later = Some(later);
