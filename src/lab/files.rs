@@ -61,9 +61,9 @@ impl Write for Pending {
 }
 
 /// Where the bytes of a file go: a writer, and the temporary file if there is one, with its final path.
-type Target = (Box<dyn Write>, Option<(Temporary, PathBuf)>);
+type FileTarget = (Box<dyn Write>, Option<(Temporary, PathBuf)>);
 
-fn target(path: &Path) -> std::io::Result<Target> {
+fn target(path: &Path) -> std::io::Result<FileTarget> {
     if is_standard_output(path) {
         return Ok((Box::new(std::io::stdout()), None));
     }
