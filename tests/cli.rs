@@ -70,7 +70,7 @@ fn bad_requests_are_refused_in_one_line() {
         (&["run", "staack"], &["unknown scene 'staack'", "'stack'"]),
         (&["run", "stack:x"], &["'x'", "stack"]),
         (&["run", "stack:0"], &["'0'"]),
-        (&["scene", "arhc", "--json"], &["'arch'"]),
+        (&["list", "arhc", "--json"], &["'arch'"]),
         (
             &["run", "stack:2", "--solver", "softstep"],
             &["'softstep'", "'soft_step'", "[possible values: projection, pgs, "],
@@ -80,8 +80,8 @@ fn bad_requests_are_refused_in_one_line() {
         (&["profile", "stack:2", "--phase", "solv"], &["'solv'", "'solve'", "warm-start"]),
         (&["verify", "--cases", "B9.gapp"], &["'B9.gapp'", "'B9.gap'"]),
         (&["completions", "tcsh"], &["tcsh", "bash", "fish", "zsh"]),
-        (&["scene"], &["SCENE"]),
-        (&["scene", "arch", "--schema"], &["--schema"]),
+        (&["list", "solvers", "--seed", "3"], &["seed: needs a scene"]),
+        (&["scene", "arch"], &["simpulse list SCENE"]),
         (&["run", "stack:2", "--order", "natral"], &["'natral'", "'natural'", "colored"]),
         (&["run", "stack:2", "--order", "natural", "--lanes", "8"], &["lanes", "8"]),
         (&["run", "stack:2", "--substeps", "0"], &["substeps", "0"]),
@@ -361,7 +361,7 @@ fn every_csv_header_is_documented() {
         let documented = columns::SHEETS.iter().any(|sheet| sheet.documents(&names));
         assert!(documented, "{name}: {header}");
     }
-    let shown = simpulse(folder.path(), &["columns"]);
+    let shown = simpulse(folder.path(), &["list", "columns"]);
     assert!(
         text(&shown.stdout).contains("penetration_judged_m")
             && text(&shown.stdout).contains("tangent_impulse")
@@ -378,10 +378,13 @@ fn data_is_printed_as_json_where_that_is_asked_for() {
             .unwrap_or_else(|e| panic!("{args:?}: {e}: {shown}{}", text(&output.stderr)))
     };
     assert_eq!(json(&["run", "stack:2", "--steps", "9", "--json"])["errors"]["steps"], 9);
-    assert_eq!(json(&["solvers", "--json"]).as_array().unwrap().len(), VARIANTS.len());
-    assert_eq!(json(&["scene", "arch", "--json"])["name"], "arch");
-    assert_eq!(json(&["scene", "--schema"])["title"], "simpulse scene");
-    assert!(json(&["columns", "--json"])[0]["columns"].is_array() && json(&["scenes", "--json"]).is_array());
+    assert_eq!(json(&["list", "solvers", "--json"]).as_array().unwrap().len(), VARIANTS.len());
+    assert_eq!(json(&["list", "arch", "--json"])["name"], "arch");
+    assert_eq!(json(&["list", "schema"])["title"], "simpulse scene");
+    assert!(
+        json(&["list", "columns", "--json"])[0]["columns"].is_array()
+            && json(&["list", "scenes", "--json"]).is_array()
+    );
     assert!(json(&["verify", "--list", "--json"]).as_array().unwrap().len() > 50);
     let cells = json(&["verify", "--cases", "A0", "--solvers", "pgs", "--json"]);
     assert_eq!(cells["results"][0]["passed"], true);
@@ -548,7 +551,7 @@ fn a_run_writes_its_columns_at_the_steps_asked_for() {
 #[test]
 fn lists_and_scenes_are_printed() {
     let folder = tempfile::tempdir().unwrap();
-    let solvers = simpulse(folder.path(), &["solvers"]);
+    let solvers = simpulse(folder.path(), &["list", "solvers"]);
     let (list, parameters) = text(&solvers.stdout).split_once("\n\n").unwrap();
     assert_eq!(list.lines().count(), 1 + VARIANTS.len());
     for parameter in VARIANTS.iter().flat_map(|v| v.parameters) {
@@ -557,13 +560,13 @@ fn lists_and_scenes_are_printed() {
             "{parameter:?}"
         );
     }
-    let scenes = simpulse(folder.path(), &["scenes"]);
+    let scenes = simpulse(folder.path(), &["list", "scenes"]);
     assert_eq!(text(&scenes.stdout).lines().count(), simpulse::lab::scenes::CATALOG.len());
 
     // A printed scene can be read, and prints the same text again.
-    let printed = simpulse(folder.path(), &["scene", "card_house", "--json"]).stdout;
+    let printed = simpulse(folder.path(), &["list", "card_house", "--json"]).stdout;
     std::fs::write(folder.path().join("house.json"), &printed).unwrap();
-    assert_eq!(simpulse(folder.path(), &["scene", "house.json", "--json"]).stdout, printed);
+    assert_eq!(simpulse(folder.path(), &["list", "house.json", "--json"]).stdout, printed);
 
     let help = simpulse(folder.path(), &["--help"]);
     assert_eq!(help.status.code(), Some(0));
@@ -627,7 +630,7 @@ fn every_command_in_readme_and_papers_is_one() {
 #[test]
 fn a_scene_that_was_printed_falls_as_its_own_does() {
     let folder = tempfile::tempdir().unwrap();
-    let printed = simpulse(folder.path(), &["scene", "stack:20", "--json"]).stdout;
+    let printed = simpulse(folder.path(), &["list", "stack:20", "--json"]).stdout;
     std::fs::write(folder.path().join("st.json"), &printed).unwrap();
     let run = |args: &[&str]| {
         let output = simpulse(folder.path(), args);

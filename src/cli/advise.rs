@@ -31,7 +31,7 @@ use std::process::ExitCode;
 #[derive(Args, Clone, Debug)]
 #[command(after_help = "\
 Lengths are in nm, um, mm, cm or m, times in ns, us, ms or s; a distance to the
-reference value is in the unit of that value (`simpulse scene SCENE` tells it).
+reference value is in the unit of that value (`simpulse list SCENE` tells it).
 
 Examples:
   simpulse advise stack:20 --max-penetration 10mm

@@ -7,6 +7,7 @@ use super::capture::CaptureArgs;
 use super::compare::CompareArgs;
 use super::converge::ConvergeArgs;
 use super::growth::GrowthArgs;
+use super::list::ListArgs;
 use super::merge::MergeArgs;
 use super::papers::PapersArgs;
 use super::profile::ProfileArgs;
@@ -17,7 +18,6 @@ use super::savings::SavingsArgs;
 use super::snapshot::SnapshotArgs;
 use super::study::{EXAMPLES as STUDY_EXAMPLES, StudyArgs};
 use super::torture::TortureArgs;
-use super::values;
 use super::verify::VerifyArgs;
 use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
@@ -28,7 +28,7 @@ Examples:
   simpulse --quick                               a look at everything, in seconds
   simpulse study --scenes stack:40,arch --solvers soft_step,pgs --lanes 1,8 --substeps 2,4,8
   simpulse run pyramid:50 --solver soft_step --lanes 16
-  simpulse scene arch --json > my.json           a scene to edit …
+  simpulse list arch --json > my.json            a scene to edit …
   simpulse run my.json --state out.csv --every 10     … and to run";
 
 const COMPLETION_EXAMPLES: &str = "\
@@ -77,25 +77,10 @@ pub enum Command {
     Growth(GrowthArgs),
     Savings(SavingsArgs),
     Papers(PapersArgs),
-    /// List the scenes
-    Scenes(ListArgs),
-    /// List the solvers
-    Solvers(ListArgs),
-    /// Describe a scene, or print it as a file to edit
-    Scene(SceneArgs),
-    /// Describe the columns of every CSV file
-    Columns(ListArgs),
+    List(ListArgs),
     /// Print shell completions
     #[command(after_help = COMPLETION_EXAMPLES)]
     Completions(CompletionArgs),
-}
-
-/// Options common to all list commands.
-#[derive(Args, Debug)]
-pub struct ListArgs {
-    /// Print JSON instead of text
-    #[arg(long)]
-    pub json: bool,
 }
 
 /// Arguments of `simpulse completions`.
@@ -103,21 +88,4 @@ pub struct ListArgs {
 pub struct CompletionArgs {
     /// Which one
     pub shell: Shell,
-}
-
-/// Arguments of `simpulse scene`.
-#[derive(Args, Debug)]
-pub struct SceneArgs {
-    /// Scene
-    #[arg(value_name = "SCENE", value_parser = values::scene(), help = values::scene_help(), required_unless_present = "schema")]
-    pub name: Option<String>,
-    /// Print the JSON schema of scene files
-    #[arg(long, exclusive = true)]
-    pub schema: bool,
-    /// Print JSON instead of text: the scene in the file format
-    #[arg(long)]
-    pub json: bool,
-    /// Random seed, for scenes that have one
-    #[arg(long)]
-    pub seed: Option<u64>,
 }

@@ -56,7 +56,7 @@ pub struct ConvergeArgs {
     /// Lanes in colored order
     #[command(flatten)]
     pub lanes: LaneArgs,
-    /// Solver parameters, such as `contact_hertz=60` (`simpulse solvers` lists them)
+    /// Solver parameters, such as `contact_hertz=60` (`simpulse list solvers` lists them)
     #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
     pub set: Vec<Override>,
     /// Seed of the shuffled order

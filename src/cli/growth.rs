@@ -40,7 +40,7 @@ Examples:
       Copies of a pyramid of 55 boxes: as many contacts, in small islands.
   simpulse growth --scene circle_pile --solver pgs --lanes 16 --out results/growth")]
 pub struct GrowthArgs {
-    /// A scene of `simpulse scenes`: without a size it is grown, with one it is copied
+    /// A scene of `simpulse list scenes`: without a size it is grown, with one it is copied
     #[arg(long, default_value = "pyramid", value_name = "SCENE", value_parser = values::scene())]
     pub scene: String,
     /// Numbers of contacts to aim at

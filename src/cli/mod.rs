@@ -12,6 +12,7 @@ pub mod compare;
 pub mod converge;
 pub mod growth;
 pub mod interrupt;
+pub mod list;
 pub mod merge;
 pub mod output;
 pub mod papers;
@@ -29,21 +30,13 @@ pub mod values;
 pub mod verify;
 
 use crate::engine::lanes::unused_cpu_features;
-use crate::engine::solvers::{VARIANTS, Variant};
 use crate::engine::world::World;
 use crate::lab::error::Error;
 use crate::lab::metrics::{Errors, Observation};
-use crate::lab::overrides;
-use crate::lab::report::columns::{self, Column, SHEETS, Sheet};
-use crate::lab::scenes::tolerance::Tolerance;
-use crate::lab::scenes::{self, CATALOG, Description, SCHEMA};
-use crate::lab::study::{DEFAULT_SOLVERS, budget, is_path, open_scene};
-use crate::lab::units::{bodies, si};
-use args::{Cli, Command, CompletionArgs, ListArgs, SceneArgs};
+use args::{Cli, Command, CompletionArgs};
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, Parser};
-use output::{note, print, print_json};
-use serde_json::{Value, json};
+use output::{note, print};
 use std::io::ErrorKind;
 use std::process::ExitCode;
 
@@ -115,10 +108,7 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Growth(args)) => growth::run(&args),
         Some(Command::Savings(args)) => savings::run(&args),
         Some(Command::Papers(args)) => papers::run(&args),
-        Some(Command::Scenes(args)) => scenes(&args),
-        Some(Command::Solvers(args)) => solvers(&args),
-        Some(Command::Scene(args)) => print(&scene(&args)?),
-        Some(Command::Columns(args)) => columns(&args),
+        Some(Command::List(args)) => list::run(&args),
         Some(Command::Completions(args)) => completions(&args),
     }
 }
@@ -167,144 +157,10 @@ fn one_line(message: &str) -> String {
     message.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-fn scenes(args: &ListArgs) -> Result<ExitCode, Error> {
-    if args.json {
-        let entry = |e: &crate::lab::scenes::Entry| {
-            json!({
-                "name": e.name, "summary": e.summary, "reference_value_known": e.truth.is_some(),
-                "size": e.size.map(|s| json!({
-                    "meaning": s.meaning, "default": s.default, "min": s.min, "max": s.max,
-                })),
-            })
-        };
-        return print_json(&CATALOG.iter().map(entry).collect());
-    }
-    let mut text = String::new();
-    for entry in CATALOG {
-        let name = match entry.size {
-            Some(size) => format!("{}:{}", entry.name, size.default),
-            None => entry.name.to_string(),
-        };
-        let known = if entry.truth.is_some() { " [reference value known]" } else { "" };
-        let size = entry.size.map_or(String::new(), |s| format!(" ({} to {} {})", s.min, s.max, s.meaning));
-        text += &format!("{name:<22}{}{size}{known}\n", entry.summary);
-    }
-    print(&text)
-}
-
-fn solvers(args: &ListArgs) -> Result<ExitCode, Error> {
-    let is_default = |v: &Variant| DEFAULT_SOLVERS.contains(&v.name);
-    if args.json {
-        let entry = |v: &&'static Variant| {
-            json!({
-                "name": v.name, "summary": v.summary, "source": v.source, "standard_budget": v.budget,
-                "uses": v.uses, "parameters": overrides::by_name(v, &v.defaults()),
-                "in_default_study": is_default(v),
-            })
-        };
-        return print_json(&VARIANTS.iter().map(entry).collect::<Value>());
-    }
-    let width = VARIANTS.iter().map(|v| v.name.len()).max().unwrap_or(0);
-    let line = |v: &&Variant| {
-        let standard = budget::brief(&v.budget, v);
-        let star = if is_default(v) { "*" } else { " " };
-        let own: String = v.parameters.iter().map(|p| format!("; {}={}", p.name, p.default)).collect();
-        format!("{star} {:<width$}  {} [{}; standard {standard}{own}]\n", v.name, v.summary, v.source)
-    };
-    let lines: String = VARIANTS.iter().map(line).collect();
-    print(&format!("* in the default study; --solvers all runs every solver\n{lines}\n{}", parameters()))
-}
-
-/// The parameters of `--set` and `--sweep`, each with its range and meaning; several lines for a parameter
-/// that differs between solvers.
-fn parameters() -> String {
-    let mut lines: Vec<String> = Vec::new();
-    for p in VARIANTS.iter().flat_map(|v| v.parameters) {
-        let [low, high] = p.range;
-        let range = format!("{low} to {high} {}", p.unit);
-        let line = format!("  {:<16}  {:<22}  {}\n", p.name, range.trim_end(), p.meaning);
-        if !lines.contains(&line) {
-            lines.push(line);
-        }
-    }
-    lines.sort();
-    format!(
-        "Parameters (--set NAME=VALUE; study --sweep NAME=VALUE,VALUE,…) with their ranges\n{}",
-        lines.concat()
-    )
-}
-
-fn columns(args: &ListArgs) -> Result<ExitCode, Error> {
-    let column = |c: &Column| json!({ "name": c.name, "unit": c.unit, "meaning": c.meaning });
-    let sheet = |s: &&Sheet| {
-        json!({
-            "file": s.file, "command": s.command, "line": s.line,
-            "columns": (s.columns)().iter().map(column).collect::<Vec<_>>(),
-        })
-    };
-    match args.json {
-        true => print_json(&SHEETS.iter().map(sheet).collect()),
-        false => print(&columns::text()),
-    }
-}
-
 fn completions(args: &CompletionArgs) -> Result<ExitCode, Error> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "simpulse", &mut script);
     print(&String::from_utf8_lossy(&script))
-}
-
-fn scene(args: &SceneArgs) -> Result<String, Error> {
-    let name = match &args.name {
-        Some(name) if !args.schema => name,
-        _ => return Ok(SCHEMA.to_string()),
-    };
-    let scene = match args.json || is_path(name) {
-        true => open_scene(name, args.seed, None, None)?,
-        false => return Ok(described(&scenes::describe(name, args.seed)?)),
-    };
-    match args.json {
-        true => Ok(scene.scene.to_json()),
-        false => Ok(described(&Description::of(&scene))),
-    }
-}
-
-/// Description of a scene, as text.
-fn described(scene: &Description) -> String {
-    let [gx, gy] = scene.gravity;
-    let mut text = format!(
-        "{}: {}, {} steps of {}, gravity ({gx}, {gy}) m/s²\n",
-        scene.name,
-        bodies(scene.bodies),
-        scene.steps,
-        si(scene.dt, "s")
-    );
-    if let Some((quantity, expected, unit)) = scene.reference {
-        text += &format!("reference value: {quantity} = {}\n", si(expected, unit));
-    }
-    text += "holds if nothing blows up and no body passes through a static or kinematic one";
-    for demand in &scene.demands {
-        text += &format!("; {}", demand.meaning());
-    }
-    text += "\ntolerances of a plausible run; a tight run is within 10 % of them, an exact run within 1 %\n";
-    let own = scene.tolerances;
-    let unit = scene.reference.map_or("", |(_, _, unit)| unit);
-    let lines = [
-        ("penetration", Some((own.penetration, "m"))),
-        ("residual", Some((own.residual, ""))),
-        ("reference", own.truth.map(|t| (t, unit))),
-        ("rest speed", own.rest.map(|t| (t, "m/s"))),
-    ];
-    for (name, line) in lines {
-        let Some((Tolerance { value, reason, fixed }, unit)) = line else { continue };
-        let value = if unit.is_empty() { format!("{value} body weights") } else { si(value, unit) };
-        let fixed = if fixed { " (at every accuracy)" } else { "" };
-        text += &format!("  {name:<12} {value}: {reason}{fixed}\n");
-    }
-    for what in &scene.unchecked {
-        text += &format!("not checked: {what}\n");
-    }
-    text
 }
 
 /// Runs `steps` steps. Returns the errors of the last `observed` of them; `None` without steps.

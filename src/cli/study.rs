@@ -13,7 +13,7 @@ use crate::lab::estimate::free_memory;
 use crate::lab::files;
 use crate::lab::overrides::{self, Override};
 use crate::lab::report::study_file::StudyFile;
-use crate::lab::report::{self, answer, html, orders, sweep};
+use crate::lab::report::{self, answer, by_scene, html, sweep};
 use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::study::budget::BudgetGrid;
 use crate::lab::study::sweep::QuantitySweep;
@@ -77,7 +77,7 @@ pub struct StudyArgs {
     /// Position sweeps to try, per substep
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     pub position_iterations: Vec<u32>,
-    /// Solver parameters, such as `contact_hertz=60` (`simpulse solvers` lists them)
+    /// Solver parameters, such as `contact_hertz=60` (`simpulse list solvers` lists them)
     #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
     pub set: Vec<Override>,
     /// A curve per solver: one quantity takes several values, all else stays fixed. It is a solver parameter
@@ -86,7 +86,7 @@ pub struct StudyArgs {
     /// (scene mass_ratio)
     #[arg(long, value_name = "NAME=VALUE,VALUE,…")]
     pub sweep: Option<QuantitySweep>,
-    /// Override the scenes' tolerances, such as penetration=5mm,residual=0.05,reference=0.1 (`simpulse scene NAME`
+    /// Override the scenes' tolerances, such as penetration=5mm,residual=0.05,reference=0.1 (`simpulse list SCENE`
     /// lists them; that of the reference value has the value's unit)
     #[arg(long, value_delimiter = ',', value_name = "NAME=VALUE,…", value_parser = NonEmptyStringValueParser::new())]
     pub tolerance: Vec<String>,
@@ -303,7 +303,10 @@ pub fn text(study: &StudyFile, steps: Option<u32>, out: &Path, paths: &[PathBuf]
     let mut text = answer::wrapped(&study.caution())
         + &answer
         + &answer::wrapped(&study.budgets())
-        + &orders::text(&study.records);
+        + &by_scene::order_tables(&study.records)
+            .iter()
+            .map(|t| format!("\n{}", t.text()))
+            .collect::<String>();
     let names: Vec<String> =
         paths.iter().filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned())).collect();
     text += &answer::wrapped(&format!("\nwrote {} in {}\n", names.join(", "), out.display()));

@@ -187,7 +187,7 @@ pub struct SettingArgs {
     /// Position sweeps per substep [default: the solver's]
     #[arg(long, value_name = "N")]
     pub position_iterations: Option<u32>,
-    /// Solver parameters, such as `contact_hertz=60` (`simpulse solvers` lists them)
+    /// Solver parameters, such as `contact_hertz=60` (`simpulse list solvers` lists them)
     #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
     pub set: Vec<Override>,
     /// Impacts

@@ -91,7 +91,7 @@
 //! units  estimate                human-readable numbers; what a run will take
 //! reference  metrics             certified solutions; errors read from states
 //! scenes  capture  picture       what is simulated, and its known truth; frozen problems; frames drawn
-//! recording                      whole runs in a file, and the page that plays them
+//! recording  chart               whole runs in a file, and the page that plays them; charts as SVG
 //! study  converge  verify        solver × scene × budget; iterations to a tolerance; hard cases
 //! advise  report                 the cheapest setting; tables, plots, records
 //! profile  compare               phases against the roofline, cost by size; two studies side by side
@@ -104,6 +104,8 @@ pub mod ablate;
 pub mod advise;
 pub mod agree;
 pub mod capture;
+#[doc(hidden)]
+pub mod chart;
 pub mod compare;
 pub mod converge;
 pub mod error;

@@ -84,7 +84,7 @@ const LAB: &[&[&str]] = &[
     &["reference"],
     &["metrics"],
     &["scenes", "capture", "picture"],
-    &["recording"],
+    &["recording", "chart"],
     &["verify", "study", "converge"],
     &["advise", "report"],
     &["ablate", "agree", "profile", "compare", "torture"],

@@ -39,7 +39,10 @@ fn json(bodies: &str, gravity: f64) -> Scene {
 fn a_world_without_bodies_has_no_errors() {
     for variant in &VARIANTS {
         let errors = observe(&mut World::new(Settings::new(variant)), 3);
-        assert!(errors.steps == 3 && errors.iter().all(|(_, value)| value.is_none_or(|v| v == 0.0)), "{errors:?}");
+        assert!(
+            errors.steps == 3 && errors.iter().all(|(_, value)| value.is_none_or(|v| v == 0.0)),
+            "{errors:?}"
+        );
     }
 }
 

@@ -4,7 +4,7 @@
 use super::{Agreement, AgreementCurve};
 use crate::lab::error::Error;
 use crate::lab::picture::axes::{Area, Drawn, Edges, INK, LogScale, with_dark, write};
-use crate::lab::report::style::solver_color;
+use crate::lab::report::style::Style;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
@@ -62,4 +62,10 @@ fn panel(area: &Area, (x, y): (i32, i32), agreement: &Agreement, curve: &Agreeme
         area.draw(&Circle::new(dot, 3, solver_color(agreement.solver).filled()))?;
     }
     Ok(())
+}
+
+/// The color of a solver.
+fn solver_color(name: &str) -> RGBColor {
+    let crate::lab::picture::Color(r, g, b, _) = Style::of(name).rgb();
+    RGBColor(r, g, b)
 }

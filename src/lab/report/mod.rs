@@ -3,17 +3,15 @@
 #[doc(hidden)]
 pub mod answer;
 #[doc(hidden)]
+pub mod by_scene;
+#[doc(hidden)]
 pub mod columns;
+#[doc(hidden)]
+pub mod doc;
 pub mod environment;
 pub mod export;
 #[doc(hidden)]
 pub mod html;
-#[doc(hidden)]
-pub mod orders;
-#[doc(hidden)]
-pub mod plot;
-#[doc(hidden)]
-pub mod profiles;
 #[doc(hidden)]
 pub mod savings;
 pub mod study_file;
@@ -34,27 +32,22 @@ use study_file::StudyFile;
 /// File names of pictures.
 const SWEEP: &str = "sweep.svg";
 const SPEED: &str = "speed_vs_error.svg";
-const PROFILES: &str = "profiles.svg";
 
-/// All tables of a study: per scene, at equal time and at equal error, and the performance profiles.
+/// All tables of a study: per scene, and the performance profiles.
 pub fn tables(records: &[Record]) -> String {
     if sweep::is_sweep(records) {
         return sweep::tables(records);
     }
-    let mut text = format!("{}\n", table::LEGEND);
+    let mut text = format!("{}\n", by_scene::LEGEND);
     for scene in records.chunk_by(|a, b| a.scene == b.scene) {
-        text += &table::scene_table(scene);
-        text += "\n";
+        let (table, notes) = by_scene::scene_table(scene);
+        text += &format!("{}{notes}\n", table.text());
     }
-    text += &answer::later_table(records);
-    text += &table::impacts_table(records);
-    let (slices, profiles) = (profiles::slice_tables(records), profiles::profile_table(records));
-    text + &slices + "\n" + &profiles
+    text + &answer::later_table(records) + &by_scene::profile_table(records).text()
 }
 
-/// Writes `tables.txt`, `study.csv`, `study.json` and pictures (`speed_vs_error.svg` and `profiles.svg`, or
-/// `sweep.svg`) into `folder`, and the [page](html) made from these and the folder's other files. Returns
-/// their paths. If an earlier study was of the other kind, its pictures are removed.
+/// Writes `tables.txt`, `study.csv`, `study.json` and a picture (`speed_vs_error.svg`, or `sweep.svg`) into `folder`, and the [page](html) made from these and the folder's other files. Returns
+/// their paths. If an earlier study was of the other kind, its picture is removed.
 ///
 /// Everything except the page is prepared before the first file is written.
 pub fn write_study(folder: &Path, study: &StudyFile) -> Result<Vec<PathBuf>, Error> {
@@ -64,14 +57,10 @@ pub fn write_study(folder: &Path, study: &StudyFile) -> Result<Vec<PathBuf>, Err
         ("study.csv", export::csv(records, &study.environment)?),
         ("study.json", study.to_json()?),
     ];
-    if sweep::is_sweep(records) {
-        contents.push((SWEEP, html::sweep_svg(records).into_bytes()));
-    } else {
-        contents.push((SPEED, plot::svg(records)?.into_bytes()));
-        contents.push((PROFILES, profiles::svg(records)?.into_bytes()));
-    }
+    let picture = if sweep::is_sweep(records) { SWEEP } else { SPEED };
+    contents.push((picture, html::charts::file(records).into_bytes()));
     files::prepare_folder(folder)?;
-    for name in [SWEEP, SPEED, PROFILES].into_iter().filter(|name| contents.iter().all(|c| c.0 != *name)) {
+    for name in [SWEEP, SPEED].into_iter().filter(|name| contents.iter().all(|c| c.0 != *name)) {
         let path = folder.join(name);
         if path.exists() {
             std::fs::remove_file(&path).map_err(Error::io(&path))?;

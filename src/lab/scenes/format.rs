@@ -20,7 +20,7 @@ pub const DEFAULT_STEPS: u32 = 300;
 
 /// A scene: bodies, gravity, step and number of steps, and expectations on a run.
 ///
-/// Scenes are written in code or read from JSON (`simpulse scene NAME --json` prints one):
+/// Scenes are written in code or read from JSON (`simpulse list NAME --json` prints one):
 ///
 /// ```
 /// use simpulse::engine::{solvers, world::Settings};
