@@ -9,7 +9,7 @@ use simpulse::engine::world::{Order, Settings, World};
 use simpulse::lab::capture::capture;
 use simpulse::lab::converge::replay::{Replay, Replayed, Sequence, Start};
 use simpulse::lab::converge::{ConvergeOptions, ConvergeReport, ReplayCurve, converge, plot, table};
-use simpulse::lab::picture::Color;
+use simpulse::lab::chart::Style;
 use simpulse::lab::reference::certify::{Uniqueness, reference};
 use simpulse::lab::reference::frozen::Frozen;
 use simpulse::lab::reference::gallery::{
@@ -469,7 +469,7 @@ fn reports_say_what_was_measured() {
     let json: serde_json::Value = serde_json::from_str(&table::json(&report).unwrap()).unwrap();
     assert_eq!(json["curves"].as_array().unwrap().len(), report.curves.len());
     assert_eq!(json["contacts"], 4);
-    let svg = plot::svg(&report, &|_| Color::rgb(0)).unwrap();
+    let svg = plot::svg(&report, &|_| Style::at(0));
     assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>") && !svg.contains("NaN"));
 
     // Without a reference, there is nothing to perturb into a warm start.

@@ -40,11 +40,11 @@ const TEXTS: &str = r#"
     for (const svg of plots) {
         const [, , w, h] = svg.getAttribute("viewBox").split(" ").map(Number);
         for (const text of svg.querySelectorAll("text")) {
-            if (text.getAttribute("transform") || text.classList.contains("dot-name")) continue;
+            if (text.getAttribute("transform")) continue;
             const b = text.getBBox();
             if (b.x < -1 || b.y < -1 || b.x + b.width > w + 1 || b.y + b.height > h + 1) outside.push(text.textContent);
         }
-        const labels = [...svg.querySelectorAll("text.x")].map((t) => [t.getBBox(), t.textContent]);
+        const labels = [...svg.querySelectorAll("text:not([transform])")].map((t) => [t.getBBox(), t.textContent]);
         for (const [i, [a, one]] of labels.entries()) for (const [b, other] of labels.slice(i + 1)) {
             if (Math.abs(a.y - b.y) < 8 && a.x < b.x + b.width && b.x < a.x + a.width) touching.push(one + "|" + other);
         }
@@ -61,7 +61,7 @@ fn the_page_of_a_sweep_is_whole_in_a_browser() {
     let script = format!(
         r#"{TEXTS}
         return {{
-            plots: plots.length, outside, touching, curves: document.querySelectorAll("svg .curve").length,
+            plots: plots.length, outside, touching, curves: document.querySelectorAll("svg.chart polyline[stroke-width='2']").length,
             wide: document.body.scrollWidth - document.body.clientWidth,
         }};"#
     );

@@ -131,7 +131,7 @@ fn warnings(records: &[Record], steps: Option<u32>) -> String {
     let waited = samples().map(|s| s.waited).sum::<f64>() / count;
     if waited > BUSY {
         text += &format!(
-            "WARNING  this machine was busy: the timed thread waited for a processor {:.0} % of the time. That is taken \
+            "WARNING: this machine was busy: the timed thread waited for a processor {:.0} % of the time. That is taken \
              out of the times, and differences up to it are shown as ties. Run again on an idle machine.\n",
             100.0 * waited
         );
@@ -139,12 +139,12 @@ fn warnings(records: &[Record], steps: Option<u32>) -> String {
     let rounds = samples().map(|s| s.rounds).min().unwrap_or(0);
     if rounds < 3 && count > 1.0 {
         text += &format!(
-            "WARNING  {rounds} round{}: spikes of a solver cannot be told from those of the machine, so costs are medians.\n",
+            "WARNING: {rounds} round{}: spikes of a solver cannot be told from those of the machine, so costs are medians.\n",
             if rounds == 1 { "" } else { "s" }
         );
     }
     if steps.is_some() && records.iter().all(|r| r.later.is_none()) {
-        text += "WARNING  runs were not extended to a minute, so later failures were not looked for.\n";
+        text += "WARNING: runs were not extended to a minute, so later failures were not looked for.\n";
     }
     for scene in records.chunk_by(|a, b| a.scene == b.scene) {
         let mut unsolved: Vec<&str> = scene.iter().filter(|r| r.is_unsolved()).map(|r| r.solver).collect();
@@ -152,12 +152,12 @@ fn warnings(records: &[Record], steps: Option<u32>) -> String {
         if !unsolved.is_empty() {
             let solvers = unsolved.join(", ");
             text += &format!(
-                "NOT SCORED   {}: too many contact points for the method of {solvers}\n",
+                "NOT SCORED: {}: too many contact points for the method of {solvers}\n",
                 scene[0].scene
             );
         }
         for what in &scene[0].unchecked {
-            text += &format!("NOT CHECKED  {}: {what}\n", scene[0].scene);
+            text += &format!("NOT CHECKED: {}: {what}\n", scene[0].scene);
         }
     }
     text
@@ -367,7 +367,7 @@ fn accuracies(scenes: &[Answer], records: &[Record]) -> DocTable {
 /// A table of all solvers over all scenes.
 fn standings(ranking: &Ranking, scenes: usize) -> DocTable {
     const CAPTION: &str = "\
-Ranking over all scenes.  score: time of the fastest solver ÷ time of this one, each at its cheapest good-enough setting, \
+Ranking over all scenes. score: time of the fastest solver ÷ time of this one, each at its cheapest good-enough setting, \
 averaged over scenes (0 where it is not good enough); range: with any scene left out, and with half or twice the tolerances";
     let head = ["solver", "score", "range", "plausible", "tight", "exact", "fastest or tied", "fails on"];
     let mut rows = DocTable { most: MOST_RANKED, ..DocTable::new(CAPTION, 1, &head) };
@@ -515,7 +515,7 @@ mod tests {
         records[0].unchecked = vec!["what must hold".into()];
         let text = page(&records);
         assert!(
-            text.contains("31 % of the time") && text.contains("NOT CHECKED  stack:2: what must hold"),
+            text.contains("31 % of the time") && text.contains("NOT CHECKED: stack:2: what must hold"),
             "{text}"
         );
     }

@@ -223,7 +223,7 @@ pub fn order_tables(records: &[Record]) -> Vec<DocTable> {
 
 /// The text above the first table of orders.
 const ORDERS: &str = "\
-Order of contacts.  Settings that hold, of those that ran; median over these of the penetration and of the contact-law \
+Order of contacts. Settings that hold, of those that ran; median over these of the penetration and of the contact-law \
 residual (weights of the lighter body)";
 
 /// `2 of 3, 1.2 mm, 4e-3` for the settings of a solver in an order. A setting at several lane widths counts

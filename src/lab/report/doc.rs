@@ -199,6 +199,9 @@ pub fn text(blocks: &[Block]) -> String {
     let one = |block: &Block| match block {
         Block::Heading(name, remark) if remark.is_empty() => format!("\n{name}\n"),
         Block::Heading(name, remark) => format!("\n{name} · {remark}\n"),
+        Block::Text(_, text) if text.is_empty() => String::new(),
+        Block::Text(Tone::Lead, text) => lines(text) + "\n",
+        Block::Text(Tone::Soft, text) => format!("\n{}", lines(text)),
         Block::Text(_, text) => lines(text),
         Block::Table(table) => format!("\n{}", table.text()),
         Block::Charts(..) | Block::Html(_) => String::new(),
@@ -224,8 +227,12 @@ pub fn html(blocks: &[Block]) -> String {
         }
         Block::Text(_, text) if text.trim().is_empty() => String::new(),
         Block::Text(tone, text) => {
-            let lines: Vec<String> = text.trim().lines().map(escaped).collect();
-            format!("<p class=\"{}\">{}</p>\n", tone.class(), lines.join("<br/>\n"))
+            // Every second part stands between backquotes.
+            let safe = escaped(text.trim());
+            let parts = safe.split('`').enumerate();
+            let marked = parts.map(|(i, part)| if i % 2 == 1 { format!("<code>{part}</code>") } else { part.into() });
+            let lines = marked.collect::<String>().replace('\n', "<br/>\n");
+            format!("<p class=\"{}\">{lines}</p>\n", tone.class())
         }
         Block::Table(table) if table.rows.is_empty() => String::new(),
         Block::Table(table) => table.html(),
