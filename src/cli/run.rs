@@ -215,9 +215,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     if args.json {
         return print_json(&json(&world, scene, &found)?);
     }
-    let mut text = head(&world, scene);
-    text += &if args.all { everything(&world, &found) } else { found.figures() };
-    print_beside(files.into_iter().map(|(_, file)| file), &(text + &written))
+    let text = head(&world, scene) + &found.text(&world, args.all) + &written;
+    print_beside(files.into_iter().map(|(_, file)| file), &text)
 }
 
 /// The settings of a solver with the order and lanes of the command. Errors: natural order in lanes.
@@ -236,8 +235,11 @@ pub(super) fn settings(args: &RunArgs, own: Settings) -> Result<Settings, Error>
     Ok(Settings { order, record_impulses: true, ..own })
 }
 
+/// A line of the key figures: name, value, remark. A line without a value is a heading.
+type Figure = (&'static str, String, String);
+
 impl RunResult {
-    /// The eight key figures, and what to do about each.
+    /// The key figures, and what to do about each.
     ///
     /// | figure | what to do about it |
     /// |---|---|
@@ -250,24 +252,45 @@ impl RunResult {
     /// | residual speed | whether bodies could sleep, or jitter |
     /// | energy change | damping: a gain ends in an explosion, a loss looks viscous |
     ///
-    /// `--all` prints the others, each of which explains one of these: mean and percentiles of penetration,
-    /// parts of the residual, momentum, creep, counts.
-    fn figures(&self) -> String {
-        let e = &self.errors;
-        let line = |name: &str, value: String, note: String| {
-            format!("  {:<34}{:>12}  {note}", name, value).trim_end().to_string() + "\n"
-        };
-        let sample = &self.times.sample;
+    /// `--all` prints the others, each of which explains one of these.
+    fn figures(&self) -> Vec<Figure> {
+        let (e, sample) = (&self.errors, &self.times.sample);
+        let at = |name: &str| e.get(name).unwrap_or_default();
         let (longest, share) = self.times.longest();
-        let reference = match &self.truth {
-            None => line("distance to reference value", "–".into(), "none known".into()),
-            Some(t) => {
-                let known = format!("{} = {}", t.quantity, si(t.expected, t.unit));
-                let distance = t.error.map_or("not reached".into(), |e| si(e, t.unit));
-                line("distance to reference value", distance, known)
+        let mut lines: Vec<Figure> = vec![
+            ("cost", String::new(), String::new()),
+            ("time of a step, mean", si(1e-9 * sample.mean_ns, "s"), self.times.spread()),
+            ("longest phase", longest.into(), format!("{:.0} % of a median step", 100.0 * share)),
+        ];
+        if sample.load.unsolved > 0.0 {
+            let why = "of steps: too many points for the solver's own method".into();
+            lines.push(("solved by sweeps alone", format!("{:.0} %", 100.0 * sample.load.unsolved), why));
+        }
+        let name = if self.rests { "penetration, 99 % and at rest" } else { "penetration, 99 % of points" };
+        let [most, first] = ["penetration_max_m", "flight_depth_max_m"].map(|name| si(at(name), "m"));
+        lines.extend([
+            ("error", String::new(), String::new()),
+            (name, si(e.penetration(self.rests), "m"), format!("greatest {most}; {first} when first found")),
+        ]);
+        if let Some(rms) = e.get("joint_gap_rms_m") {
+            let mut rest = format!("greatest {}", si(at("joint_gap_max_m"), "m"));
+            for (name, column, unit) in [
+                ("held angles", "joint_lean_max_rad", "rad"),
+                ("beyond limits", "joint_excess_max", "m or rad"),
+            ] {
+                if at(column) > 0.0 {
+                    rest += &format!("; {name} {}", si(at(column), unit));
+                }
             }
+            lines.push(("joint gap, rms", si(rms, "m"), rest));
+        }
+        let (distance, known) = match &self.truth {
+            None => ("–".into(), "none known".into()),
+            Some(t) => (
+                t.error.map_or("not reached".into(), |e| si(e, t.unit)),
+                format!("{} = {}", t.quantity, si(t.expected, t.unit)),
+            ),
         };
-        let unchecked: String = self.unchecked.iter().map(|what| format!("not checked: {what}\n")).collect();
         let no_condition = self.unchecked.iter().any(|what| what.contains("condition"));
         let no_value = self.truth.is_none() && !self.unchecked.is_empty();
         let yes = match (no_condition, no_value) {
@@ -275,78 +298,37 @@ impl RunResult {
             (false, true) => "yes (no reference value to compare with)",
             (false, false) => "yes",
         };
-        let holds = self.broken.map_or(yes.to_string(), |broken| broken.mark.word().to_string());
-        let when = self.broken.map_or(String::new(), |broken| format!("at step {}", broken.step));
-        let joints = e.get("joint_gap_rms_m").map_or(String::new(), |rms| {
-            let [gap, lean, excess] = ["joint_gap_max_m", "joint_lean_max_rad", "joint_excess_max"]
-                .map(|name| e.get(name).unwrap_or_default());
-            let mut rest = format!("greatest {}", si(gap, "m"));
-            if lean > 0.0 {
-                rest += &format!("; held angles {}", si(lean, "rad"));
-            }
-            if excess > 0.0 {
-                rest += &format!("; beyond limits {}", si(excess, "m or rad"));
-            }
-            line("joint gap, rms", si(rms, "m"), rest)
-        });
-        [
-            "cost\n".to_string(),
-            line("time of a step, mean", si(1e-9 * sample.mean_ns, "s"), self.times.spread()),
-            line("longest phase", longest.to_string(), format!("{:.0} % of a median step", 100.0 * share)),
-            match sample.load.unsolved {
-                0.0 => String::new(),
-                share => line(
-                    "solved by sweeps alone",
-                    format!("{:.0} %", 100.0 * share),
-                    "of steps: too many points for the solver's own method".into(),
-                ),
-            },
-            "error\n".to_string(),
-            line(
-                if self.rests { "penetration, 99 % and at rest" } else { "penetration, 99 % of points" },
-                si(e.penetration(self.rests), "m"),
-                format!(
-                    "greatest {}; {} when first found",
-                    si(e.penetration_max(), "m"),
-                    si(e.get("flight_depth_max_m").unwrap_or_default(), "m")
-                ),
+        lines.extend([
+            ("contact-law residual, rms", ratio(e.law_rms_lighter()), "weights of the lighter body × step".into()),
+            ("distance to reference value", distance, known),
+            ("behavior", String::new(), String::new()),
+            (
+                "holds",
+                self.broken.map_or(yes.into(), |broken| broken.mark.word().into()),
+                self.broken.map_or(String::new(), |broken| format!("at step {}", broken.step)),
             ),
-            joints,
-            line(
-                "contact-law residual, rms",
-                ratio(e.law_rms_lighter()),
-                "weights of the lighter body × step".into(),
-            ),
-            reference,
-            "behavior\n".to_string(),
-            line("holds", holds, when),
-            line("residual speed, last second", si(e.rest_velocity(), "m/s"), "rms".into()),
-            line(
-                "energy change",
-                ratio(e.get("energy_change").unwrap_or_default()),
-                "relative; positive is a gain".into(),
-            ),
-        ]
-        .concat()
-            + &unchecked
-            + &self.times.note()
-            + "--all prints the rest\n"
+            ("residual speed, last second", si(e.rest_velocity(), "m/s"), "rms".into()),
+            ("energy change", ratio(at("energy_change")), "relative; positive is a gain".into()),
+        ]);
+        lines
     }
-}
 
-/// Every phase, count and error.
-fn everything(world: &World, found: &RunResult) -> String {
-    let mut text = found.times.table();
-    text += &counts(world);
-    text += "\nerrors\n";
-    text += &error_list(&found.errors);
-    if let Some(truth) = &found.truth {
-        text += &truth_line(truth);
-    }
-    text + &match found.broken {
-        Some(broken) => format!("  does not hold: {broken}\n"),
-        None if found.unchecked.is_empty() => "  holds\n".to_string(),
-        None => found.unchecked.iter().map(|what| format!("  not checked: {what}\n")).collect(),
+    /// The key figures and, with `all`, every phase, count and error.
+    fn text(&self, world: &World, all: bool) -> String {
+        let mut text = String::new();
+        for (name, value, remark) in self.figures() {
+            let line = match value.as_str() {
+                "" => name.to_string(),
+                value => format!("  {name:<34}{value:>12}  {remark}"),
+            };
+            text += &format!("{}\n", line.trim_end());
+        }
+        text += &self.unchecked.iter().map(|what| format!("not checked: {what}\n")).collect::<String>();
+        text += &self.times.note();
+        text + &match all {
+            true => format!("\n{}{}\nerrors\n{}", self.times.table(), counts(world), error_list(&self.errors)),
+            false => "--all prints the rest\n".to_string(),
+        }
     }
 }
 
@@ -426,14 +408,6 @@ fn counts(world: &World) -> String {
         c.impact_visits,
         c.cut_impacts
     )
-}
-
-fn truth_line(truth: &TruthError) -> String {
-    let known = format!("{} = {}", truth.quantity, si(truth.expected, truth.unit));
-    match truth.error {
-        Some(error) => format!("  distance to reference value: {} ({known})\n", si(error, truth.unit)),
-        None => format!("  distance to reference value: not reached in this run ({known})\n"),
-    }
 }
 
 /// A CSV file that appears under its name only when it is complete.

@@ -12,7 +12,7 @@ use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::overrides::{self, Override};
 use crate::lab::report::study_file::StudyFile;
-use crate::lab::report::{self, answer, html, orders, sweep};
+use crate::lab::report::{self, answer, by_scene, html, sweep};
 use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::study::budget::BudgetGrid;
 use crate::lab::study::found::{self, Found, FoundBudgets};
@@ -454,7 +454,10 @@ fn text(study: &StudyFile, steps: Option<u32>, out: &Path, paths: &[PathBuf], ve
     let mut text = answer::wrapped(&study.caution())
         + &answer
         + &answer::wrapped(&study.budgets())
-        + &orders::text(&study.records);
+        + &by_scene::order_tables(&study.records)
+            .iter()
+            .map(|t| format!("\n{}", t.text()))
+            .collect::<String>();
     let names: Vec<String> =
         paths.iter().filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned())).collect();
     text += &answer::wrapped(&format!("\nwrote {} in {}\n", names.join(", "), out.display()));

@@ -92,7 +92,7 @@
 //! reference  metrics             certified solutions; errors read from states
 //! scenes  capture  picture       what is simulated, and its known truth; frozen problems; frames drawn
 //! trial                          one run to its verdict
-//! recording                      whole runs in a file, and the page that plays them
+//! recording  chart               whole runs in a file, and the page that plays them; charts as SVG
 //! study  converge  verify        solver × scene × budget; iterations to a tolerance; hard cases
 //! report                         tables, plots, records
 //! profile  compare               phases against the roofline, cost by size; two studies side by side
@@ -102,6 +102,8 @@
 
 pub mod ablate;
 pub mod capture;
+#[doc(hidden)]
+pub mod chart;
 pub mod compare;
 pub mod converge;
 pub mod error;

@@ -51,7 +51,7 @@ const LAB: &[&[&str]] = &[
     &["metrics"],
     &["scenes", "capture", "picture"],
     &["trial"],
-    &["recording"],
+    &["recording", "chart"],
     &["verify", "study", "converge"],
     &["report"],
     &["ablate", "profile", "compare", "torture"],

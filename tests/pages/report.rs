@@ -20,17 +20,17 @@ fn the_page_is_made_again_from_the_records() {
     assert!(first.contains("id=\"scene-stack-3\"") && first.contains("class=\"replay\""));
     assert!(first.contains("Not run. <code>simpulse verify"));
     std::fs::remove_file(&page).unwrap();
-    succeeds(path, "report r");
+    succeeds(path, "study --from r");
     assert_eq!(std::fs::read_to_string(&page).unwrap(), first);
     std::fs::write(path.join("r/verify.json"), succeeds(path, "verify --cases B2 --json")).unwrap();
-    succeeds(path, "report r");
+    succeeds(path, "study --from r");
     let with = std::fs::read_to_string(&page).unwrap();
     assert!(with.contains("B2.box") && with.contains("background:#") && !with.contains("Not run."));
-    refused(path, "report nowhere", &["nowhere"]);
+    refused(path, "study --from nowhere", &["nowhere"]);
     std::fs::write(path.join("r/replay-1.rec"), "step,time,body").unwrap();
-    refused(path, "report r", &["replay-1.rec", "is no recording"]);
+    refused(path, "study --from r", &["replay-1.rec", "is no recording"]);
     std::fs::write(path.join("r/study.json"), "[]").unwrap();
-    refused(path, "report r", &["study.json"]);
+    refused(path, "study --from r", &["study.json"]);
 }
 
 /// Finds texts that extend beyond their plot, and pairs of axis labels that touch; `extra` adds more.
@@ -41,11 +41,11 @@ fn texts(page: &Path, extra: &str) -> Option<serde_json::Value> {
         for (const svg of plots) {
             const [, , w, h] = svg.getAttribute("viewBox").split(" ").map(Number);
             for (const text of svg.querySelectorAll("text")) {
-                if (text.getAttribute("transform") || text.classList.contains("dot-name")) continue;
+                if (text.getAttribute("transform")) continue;
                 const b = text.getBBox();
                 if (b.x < -1 || b.y < -1 || b.x + b.width > w + 1 || b.y + b.height > h + 1) outside.push(text.textContent);
             }
-            const labels = [...svg.querySelectorAll("text.x")].map((t) => [t.getBBox(), t.textContent]);
+            const labels = [...svg.querySelectorAll("text:not([transform])")].map((t) => [t.getBBox(), t.textContent]);
             for (const [i, [a, one]] of labels.entries()) for (const [b, other] of labels.slice(i + 1)) {
                 if (Math.abs(a.y - b.y) < 8 && a.x < b.x + b.width && b.x < a.x + a.width) touching.push(one + "|" + other);
             }
@@ -72,7 +72,7 @@ fn texts(page: &Path, extra: &str) -> Option<serde_json::Value> {
 fn the_page_of_a_sweep_is_whole_in_a_browser() {
     let folder = tempfile::tempdir().unwrap();
     succeeds(folder.path(), "study --quick --scenes stack:12,mass_ratio --sweep substeps=1,2,4,8,16 --out r");
-    let found = texts(&folder.path().join("r/report.html"), "curves: count('svg .curve')");
+    let found = texts(&folder.path().join("r/report.html"), "curves: count(\"svg.chart polyline[stroke-width='2']\")");
     let Some(found) = found else { return };
     // Time and three errors on two scenes, with a curve or two for most of seven solvers.
     assert_eq!(found["plots"], 2 * 4, "{found}");

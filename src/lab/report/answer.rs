@@ -1,8 +1,8 @@
 //! The answer of a study on one page: which solver to use and when, the drawbacks, the best setting on each
 //! scene, which solvers fail, and what was left out.
 
+use super::doc::{self, Block, Cell, DocTable, Tone};
 use super::environment::Environment;
-use super::table::{PAGE_WIDTH, finish, narrow, table};
 use super::units::{digits, is_emulated, si};
 use crate::engine::solvers::DEFAULT;
 use crate::engine::world::Order;
@@ -23,33 +23,40 @@ const BUSY: f64 = 0.02;
 
 /// Description of the columns of the answer.
 const LEGEND: &str = "\
-Good enough (plausible): the scene holds, stands for a minute if it has to rest, and its errors are within the
-tolerances of the scene (`simpulse list NAME`): pen., penetration (1 cm for bodies of 1 m); res., contact-law residual
-(10 % of the lighter body's weight); ref., distance to the reference value; rest, speed at rest. tight: within 10 % of
-them; exact: within 1 %. µs/step: mean over the run, its median, its longest step. next: the cheapest setting of another
-solver, and how much slower it is; tie: too close to call.
-";
+Good enough (plausible): the scene holds, stands for a minute if it has to rest, and its errors are within the tolerances \
+of the scene (`simpulse list SCENE`): pen., penetration (1 cm for bodies of 1 m); res., contact-law residual (10 % of the \
+lighter body's weight); ref., distance to the reference value; rest, speed at rest. tight: within 10 % of them; exact: \
+within 1 %. µs/step: mean over the run, its median, its longest step. next: the cheapest setting of another solver, and \
+how much slower it is; tie: too close to call.";
 
-/// The answer of a study, from its records alone; `steps` if runs were limited to that many steps.
+pub use super::doc::lines as wrapped;
+
+/// The answer of a study as text, from its records alone; `steps` if runs were limited to that many steps.
 pub fn text(records: &[Record], environment: &Environment, steps: Option<u32>) -> String {
-    let scenes: Vec<Answer> = records.chunk_by(|a, b| a.scene == b.scene).filter_map(Answer::of).collect();
-    let ranking = ranking(records);
-    let mut text = wrapped(&recommendation(&ranking, scenes.len(), steps)) + "\n";
-    text += &warnings(records, steps);
-    text += &wrapped(&head(records, environment, scenes.len()));
-    text += &format!("\nThe cheapest setting that is good enough\n{}", cheapest(&scenes, records));
-    text += &fallen(records);
-    text += &format!(
-        "\nIts errors in % of the tolerances, and the cheapest settings that are tight and exact\n{}",
-        accuracies(&scenes, records)
-    );
-    text += &format!("\n{}", standings(&ranking, scenes.len()));
-    text += &waves(records);
-    text + &format!("\n{LEGEND}") + &left_out(records) + &differing(records)
+    doc::text(&blocks(records, environment, steps)) + &doc::lines(&left_out(records)) + &differing(records)
 }
 
-/// The recommendation with its conditions, and the rank of the default solver. The HTML page uses it too.
-pub fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> String {
+/// The answer of a study.
+pub fn blocks(records: &[Record], environment: &Environment, steps: Option<u32>) -> Vec<Block> {
+    let scenes: Vec<Answer> = records.chunk_by(|a, b| a.scene == b.scene).filter_map(Answer::of).collect();
+    let ranking = ranking(records);
+    let (cheapest, without) = cheapest(&scenes, records);
+    let plain = |text: String| Block::Text(Tone::Plain, text);
+    vec![
+        Block::Text(Tone::Lead, recommendation(&ranking, scenes.len(), steps)),
+        Block::Text(Tone::Bad, warnings(records, steps)),
+        plain(head(records, environment, scenes.len())),
+        Block::Table(cheapest),
+        plain(without),
+        Block::Text(Tone::Bad, fallen(records)),
+        Block::Table(accuracies(&scenes, records)),
+        Block::Table(standings(&ranking, scenes.len())),
+        Block::Text(Tone::Soft, LEGEND.to_string()),
+    ]
+}
+
+/// The recommendation with its conditions, and the rank of the default solver.
+fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> String {
     let standings = &ranking.standings;
     let mut text = String::new();
     if let Some(steps) = steps {
@@ -111,54 +118,34 @@ pub fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> S
     text + "\n"
 }
 
-/// The text in lines of at most 120 characters.
-pub fn wrapped(text: &str) -> String {
-    let mut wrapped = String::new();
-    for line in text.lines() {
-        let mut length = 0;
-        for word in line.split(' ') {
-            let count = word.chars().count();
-            let gap = match length {
-                0 => "",
-                _ if length + 1 + count > PAGE_WIDTH => "\n",
-                _ => " ",
-            };
-            length = if gap == " " { length + 1 + count } else { count };
-            wrapped += &format!("{gap}{word}");
-        }
-        wrapped += "\n";
-    }
-    wrapped
-}
-
 /// The first few of a list.
 fn short_list(names: &[String], most: usize) -> String {
     let shown = names.iter().take(most).cloned().collect::<Vec<_>>().join(", ");
     if names.len() > most { format!("{shown} and {} more", names.len() - most) } else { shown }
 }
 
-/// Warnings about the quality of the figures. The HTML page uses them too.
-pub fn warnings(records: &[Record], steps: Option<u32>) -> String {
+/// Warnings about the quality of the figures.
+fn warnings(records: &[Record], steps: Option<u32>) -> String {
     let mut text = String::new();
     let samples = || records.iter().filter_map(|r| r.sample.as_ref());
     let count = samples().count().max(1) as f64;
     let waited = samples().map(|s| s.waited).sum::<f64>() / count;
     if waited > BUSY {
         text += &format!(
-            "WARNING  this machine was busy: the timed thread waited for a processor {:.0} % of the time. That is taken out\n\
-             of the times, and differences up to it are shown as ties. Run again on an idle machine.\n",
+            "WARNING: this machine was busy: the timed thread waited for a processor {:.0} % of the time. That is taken \
+             out of the times, and differences up to it are shown as ties. Run again on an idle machine.\n",
             100.0 * waited
         );
     }
     let rounds = samples().map(|s| s.rounds).min().unwrap_or(0);
     if rounds < 3 && count > 1.0 {
         text += &format!(
-            "WARNING  {rounds} round{}: spikes of a solver cannot be told from those of the machine, so costs are medians.\n",
+            "WARNING: {rounds} round{}: spikes of a solver cannot be told from those of the machine, so costs are medians.\n",
             if rounds == 1 { "" } else { "s" }
         );
     }
     if steps.is_some() && records.iter().all(|r| r.later.is_none()) {
-        text += "WARNING  runs were not extended to a minute, so later failures were not looked for.\n";
+        text += "WARNING: runs were not extended to a minute, so later failures were not looked for.\n";
     }
     for scene in records.chunk_by(|a, b| a.scene == b.scene) {
         let mut unsolved: Vec<&str> = scene.iter().filter(|r| r.is_unsolved()).map(|r| r.solver).collect();
@@ -166,12 +153,12 @@ pub fn warnings(records: &[Record], steps: Option<u32>) -> String {
         if !unsolved.is_empty() {
             let solvers = unsolved.join(", ");
             text += &format!(
-                "NOT SCORED   {}: too many contact points for the method of {solvers}\n",
+                "NOT SCORED: {}: too many contact points for the method of {solvers}\n",
                 scene[0].scene
             );
         }
         for what in &scene[0].unchecked {
-            text += &format!("NOT CHECKED  {}: {what}\n", scene[0].scene);
+            text += &format!("NOT CHECKED: {}: {what}\n", scene[0].scene);
         }
     }
     text
@@ -216,25 +203,27 @@ fn head(records: &[Record], environment: &Environment, scenes: usize) -> String 
     )
 }
 
-/// A table with the cheapest setting of each scene.
-fn cheapest(scenes: &[Answer], records: &[Record]) -> String {
-    let mut rows = table(&["scene", "solver", "budget", "µs/step", "median", "longest", "next", "slower"]);
+/// A table with the cheapest setting of each scene, and a line for each scene without one.
+fn cheapest(scenes: &[Answer], records: &[Record]) -> (DocTable, String) {
+    let head = ["scene", "solver", "budget", "µs/step", "median", "longest", "next", "slower"];
+    let mut rows = DocTable::new("The cheapest setting that is good enough", 3, &head);
     let mut notes = String::new();
     for answer in scenes {
         match (answer.best(), answer.nearest) {
             (Some(best), _) => {
-                let mut cells = vec![answer.scene.to_string()];
-                cells.extend(setting(best));
-                cells.extend(runner_up(answer, best));
-                rows.add_row(cells);
+                let [solver, others @ ..] = setting(best);
+                let mut cells = vec![Cell::scene(answer.scene), Cell::solver(&solver)];
+                cells.extend(others.map(Cell::from));
+                cells.extend(runner_up(answer, best).map(Cell::from));
+                rows.row(cells);
             }
             (None, Some(nearest)) => {
                 let [solver, budget, time, ..] = setting(nearest);
-                notes += &wrapped(&format!(
-                    "{}: none is good enough; nearest is {solver}, {budget}, {time} µs: {}",
+                notes += &format!(
+                    "{}: none is good enough; nearest is {solver}, {budget}, {time} µs: {}\n",
                     answer.scene,
                     worst(nearest)
-                ));
+                );
             }
             (None, None) => {
                 notes += &format!("{}: no setting holds\n", answer.scene);
@@ -253,9 +242,7 @@ fn cheapest(scenes: &[Answer], records: &[Record]) -> String {
             }
         }
     }
-    let any = scenes.iter().any(|a| a.best().is_some());
-    let table = if any { finish(narrow(rows, PAGE_WIDTH), 3) } else { String::new() };
-    table + &notes
+    (rows, notes)
 }
 
 /// The name of a scene of the catalog; a placeholder for the file of another one.
@@ -337,7 +324,7 @@ fn runner_up(answer: &Answer, best: &Record) -> [String; 2] {
 }
 
 /// Settings that are good enough in the run but fail in the extended run, once per setting.
-pub fn fails_later(records: &[Record]) -> Vec<(&Record, String)> {
+fn fails_later(records: &[Record]) -> Vec<(&Record, String)> {
     let mut found: Vec<(&Record, String)> = Vec::new();
     for record in records {
         let Some(why) = record.fails_later() else { continue };
@@ -349,7 +336,7 @@ pub fn fails_later(records: &[Record]) -> Vec<(&Record, String)> {
 }
 
 /// One of these settings as text.
-pub fn later_line(r: &Record, why: &str) -> String {
+fn later_line(r: &Record, why: &str) -> String {
     let order = if r.order.is_serial() { format!(", {} order", r.order.name()) } else { String::new() };
     let time = digits(r.cost_ns() / 1e3);
     format!("{}: {}, {}{order} ({time} µs) passes its run, then {why}", r.scene, r.solver, r.budget_text)
@@ -368,9 +355,13 @@ fn fallen(records: &[Record]) -> String {
 
 /// Errors of the cheapest plausible setting (% of their tolerances), and the cheapest settings at the
 /// stricter levels.
-fn accuracies(scenes: &[Answer], records: &[Record]) -> String {
-    let mut rows =
-        table(&["scene", "pen.", "res.", "ref.", "rest", "tight: solver, budget", "µs", "exact", "µs"]);
+fn accuracies(scenes: &[Answer], records: &[Record]) -> DocTable {
+    let caption = "Its errors in % of the tolerances, and the cheapest settings that are tight and exact";
+    let mut rows = DocTable::new(
+        caption,
+        1,
+        &["scene", "pen.", "res.", "ref.", "rest", "tight: solver, budget", "µs", "exact", "µs"],
+    );
     for scene in records.chunk_by(|a, b| a.scene == b.scene) {
         let best = scenes.iter().find(|a| a.scene == scene[0].scene).and_then(Answer::best);
         let share = |axis: ErrorAxis| best.and_then(|r| r.in_tolerance(axis)).map_or("–".into(), percent);
@@ -389,51 +380,28 @@ fn accuracies(scenes: &[Answer], records: &[Record]) -> String {
                 None => cells.extend(["none".to_string(), "–".to_string()]),
             }
         }
-        rows.add_row(cells);
+        rows.row(cells);
     }
-    finish(narrow(rows, PAGE_WIDTH), 1)
+    rows
 }
 
 /// A table of all solvers over all scenes.
-fn standings(ranking: &Ranking, scenes: usize) -> String {
-    let mut rows =
-        table(&["solver", "score", "range", "plausible", "tight", "exact", "fastest or tied", "fails on"]);
-    for own in ranking.standings.iter().take(MOST_RANKED) {
+fn standings(ranking: &Ranking, scenes: usize) -> DocTable {
+    const CAPTION: &str = "\
+Ranking over all scenes. score: time of the fastest solver ÷ time of this one, each at its cheapest good-enough setting, \
+averaged over scenes (0 where it is not good enough); range: with any scene left out, and with half or twice the tolerances";
+    let head = ["solver", "score", "range", "plausible", "tight", "exact", "fastest or tied", "fails on"];
+    let mut rows = DocTable { most: MOST_RANKED, ..DocTable::new(CAPTION, 1, &head) };
+    for own in &ranking.standings {
         let [low, high] = own.range;
-        let mut cells =
-            vec![own.solver.to_string(), format!("{:.2}", own.score), format!("{low:.2}–{high:.2}")];
-        cells.extend(own.good.map(|n| format!("{n} of {scenes}")));
-        cells.push(format!("{} of {scenes}", own.fastest));
-        cells.push(if own.fails_on.is_empty() { "–".into() } else { short_list(&own.fails_on, 2) });
-        rows.add_row(cells);
+        let mut cells = vec![Cell::solver(own.solver)];
+        cells.extend([format!("{:.2}", own.score), format!("{low:.2}–{high:.2}")].map(Cell::from));
+        cells.extend(own.good.into_iter().chain([own.fastest]).map(|n| format!("{n} of {scenes}").into()));
+        let fails = if own.fails_on.is_empty() { "–".into() } else { short_list(&own.fails_on, 2) };
+        cells.push(Cell { title: own.fails_on.join(", "), ..fails.into() });
+        rows.row(cells);
     }
-    let more = match ranking.standings.len().saturating_sub(MOST_RANKED) {
-        0 => String::new(),
-        more => format!("and {more} more in report.html\n"),
-    };
-    format!(
-        "Ranking over all scenes.  score: time of the fastest solver ÷ time of this one, each at its cheapest good-enough\n\
-         setting, averaged over scenes (0 where it is not good enough); range: with any scene left out, and with half or\n\
-         twice the tolerances\n{}{more}",
-        finish(narrow(rows, PAGE_WIDTH), 1)
-    )
-}
-
-/// A line on what solving impacts in waves gains and costs; empty unless both treatments ran.
-fn waves(records: &[Record]) -> String {
-    let found = study::impacts::gains(records);
-    if found.is_empty() {
-        return String::new();
-    }
-    let better = found.iter().filter(|g| g.reference.is_some_and(|r| r < 0.9) || g.residual < 0.9).count();
-    let mut costs: Vec<f64> = found.iter().filter_map(|g| g.time).collect();
-    costs.sort_by(f64::total_cmp);
-    let cost = costs.get(costs.len() / 2).map_or("–".to_string(), |c| digits(*c));
-    let text = format!(
-        "--impacts waves: of {} solver and scene pairs where something bounces, {better} improve by 10 % or more; the median time is {cost} times as long (tables.txt)\n",
-        found.len()
-    );
-    wrapped(&text)
+    rows
 }
 
 /// A line on the solvers that the default list leaves out.
@@ -441,7 +409,7 @@ fn left_out(records: &[Record]) -> String {
     match study::left_out(&solvers_of(records)).as_slice() {
         [] => String::new(),
         others => {
-            wrapped(&format!("not run, {} solvers (--solvers all): {}", others.len(), others.join(", ")))
+            format!("not run, {} solvers (--solvers all): {}", others.len(), others.join(", "))
         }
     }
 }
@@ -458,30 +426,28 @@ fn differing(records: &[Record]) -> String {
 
 /// Table of all settings that failed after their run, for `tables.txt`.
 pub fn later_table(records: &[Record]) -> String {
-    let mut rows = table(&["scene", "solver", "budget", "µs/step", "", "speed at rest"]);
-    let mut any = false;
+    let head = ["scene", "solver", "budget", "µs/step", "", "speed at rest"];
+    let caption = format!("Extended to {HORIZON} s, untimed");
+    let mut rows = DocTable { wide: true, ..DocTable::new(caption, 3, &head) };
     let mut seen: Vec<&Record> = Vec::new();
     for record in records.iter().filter(|r| r.later.is_some()) {
         if seen.iter().any(|other| other.scene == record.scene && same(other, record)) {
             continue;
         }
         seen.push(record);
-        any = true;
         let why = record.fails_later().unwrap_or("stands".into());
         let speed = record.later.and_then(|l| l.rest_speed_m_s).map_or("–".into(), |v| si(v, "m/s"));
         let cells = [record.scene.clone(), record.solver.into(), record.budget_text.clone()];
-        rows.add_row(cells.into_iter().chain([digits(record.cost_ns() / 1e3), why, speed]));
+        rows.row(cells.into_iter().chain([digits(record.cost_ns() / 1e3), why, speed]));
     }
-    if !any {
-        return String::new();
-    }
-    format!("Extended to {HORIZON} s, untimed\n{}\n", finish(rows, 3))
+    if rows.rows.is_empty() { String::new() } else { rows.text() + "\n" }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::engine::solvers::VARIANTS;
+    use crate::lab::report::table::PAGE_WIDTH;
     use crate::lab::scenes::holds::{Broken, Mark};
     use crate::lab::study::record::Later;
     use crate::lab::study::record::tests::{failed, fell, record};
@@ -570,7 +536,7 @@ mod tests {
         records[0].unchecked = vec!["what must hold".into()];
         let text = page(&records);
         assert!(
-            text.contains("31 % of the time") && text.contains("NOT CHECKED  stack:2: what must hold"),
+            text.contains("31 % of the time") && text.contains("NOT CHECKED: stack:2: what must hold"),
             "{text}"
         );
     }

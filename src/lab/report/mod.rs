@@ -3,17 +3,15 @@
 #[doc(hidden)]
 pub mod answer;
 #[doc(hidden)]
+pub mod by_scene;
+#[doc(hidden)]
 pub mod columns;
+#[doc(hidden)]
+pub mod doc;
 pub mod environment;
 pub mod export;
 #[doc(hidden)]
 pub mod html;
-#[doc(hidden)]
-pub mod orders;
-#[doc(hidden)]
-pub mod plot;
-#[doc(hidden)]
-pub mod profiles;
 pub mod study_file;
 #[doc(hidden)]
 pub mod style;
@@ -32,11 +30,10 @@ use study_file::StudyFile;
 /// File names of pictures.
 const SWEEP: &str = "sweep.svg";
 const SPEED: &str = "speed_vs_error.svg";
-const PROFILES: &str = "profiles.svg";
 
 /// Files of a study, besides its recordings.
 const FILES: [&str; 8] =
-    [SWEEP, SPEED, PROFILES, "tables.txt", "study.csv", study_file::NAME, found::NAME, html::NAME];
+    [SWEEP, SPEED, "profiles.svg", "tables.txt", "study.csv", study_file::NAME, found::NAME, html::NAME];
 
 /// Moves the study that a folder holds to `previous/N` below it, with the first free number N, so that no study
 /// is ever overwritten. Returns the new place; `None` if the folder holds no study.
@@ -63,19 +60,16 @@ pub fn tables(records: &[Record]) -> String {
     if sweep::is_sweep(records) {
         return sweep::tables(records);
     }
-    let mut text = format!("{}\n", table::LEGEND);
+    let mut text = format!("{}\n", by_scene::LEGEND);
     for scene in records.chunk_by(|a, b| a.scene == b.scene) {
-        text += &table::scene_table(scene);
-        text += "\n";
+        let (table, notes) = by_scene::scene_table(scene);
+        text += &format!("{}{notes}\n", table.text());
     }
-    text += &answer::later_table(records);
-    text += &table::impacts_table(records);
-    text + &profiles::profile_table(records)
+    text + &answer::later_table(records) + &by_scene::profile_table(records).text()
 }
 
-/// Writes `tables.txt`, `study.csv`, `study.json` and pictures (`speed_vs_error.svg` and `profiles.svg`, or
-/// `sweep.svg`) into `folder`, and the [page](html) made from these and the folder's other files. Returns
-/// their paths. If an earlier study was of the other kind, its pictures are removed.
+/// Writes `tables.txt`, `study.csv`, `study.json` and a picture (`speed_vs_error.svg`, or `sweep.svg`) into `folder`, and the [page](html) made from these and the folder's other files. Returns
+/// their paths. If an earlier study was of the other kind, its picture is removed.
 ///
 /// Everything except the page is prepared before the first file is written.
 pub fn write_study(folder: &Path, study: &StudyFile) -> Result<Vec<PathBuf>, Error> {
@@ -85,14 +79,10 @@ pub fn write_study(folder: &Path, study: &StudyFile) -> Result<Vec<PathBuf>, Err
         ("study.csv", export::csv(records, &study.environment)?),
         ("study.json", study.to_json()?),
     ];
-    if sweep::is_sweep(records) {
-        contents.push((SWEEP, html::sweep_svg(records).into_bytes()));
-    } else {
-        contents.push((SPEED, plot::svg(records)?.into_bytes()));
-        contents.push((PROFILES, profiles::svg(records)?.into_bytes()));
-    }
+    let picture = if sweep::is_sweep(records) { SWEEP } else { SPEED };
+    contents.push((picture, html::charts::file(records).into_bytes()));
     files::prepare_folder(folder)?;
-    for name in [SWEEP, SPEED, PROFILES].into_iter().filter(|name| contents.iter().all(|c| c.0 != *name)) {
+    for name in [SWEEP, SPEED].into_iter().filter(|name| contents.iter().all(|c| c.0 != *name)) {
         let path = folder.join(name);
         if path.exists() {
             std::fs::remove_file(&path).map_err(Error::io(&path))?;

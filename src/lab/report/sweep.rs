@@ -1,15 +1,17 @@
 //! A sweep as text: the values at which each solver is good enough, and a table of times and errors.
 
+use super::by_scene::verdict;
+use super::doc::{Cell, DocTable};
 use super::environment::Environment;
-use super::table::{finish, table};
 use super::units::{bodies, count, digits, ratio, si};
 use crate::lab::study::Record;
-use crate::lab::study::curve::solvers_of;
+use crate::lab::study::curve::{ErrorAxis, solvers_of};
+use crate::lab::study::sample::Sample;
 use crate::lab::study::sweep::Swept;
 
 const LEGEND: &str = "\
 A setting is good enough if the scene holds (nothing falls, slides, tunnels or blows up) and its errors are within
-the tolerances of a plausible run (`simpulse list NAME` lists them with their reasons): penetration, of 99 % of
+the tolerances of a plausible run (`simpulse list SCENE` lists them with their reasons): penetration, of 99 % of
 contact points and at rest; the contact-law residual, rms, in weights of the lighter body × step; the distance to
 the scene's reference value (– if none is known); the speed at rest.  Runs were not extended to a minute: later
 failures do not show.  budget: substeps; then velocity, relaxation and position sweeps per substep.
@@ -25,7 +27,7 @@ pub fn is_sweep(records: &[Record]) -> bool {
 /// All scenes, with a legend and a description of the machine.
 pub fn text(records: &[Record], environment: &Environment) -> String {
     let Some(swept) = records.iter().find_map(|r| r.swept) else { return String::new() };
-    let mut text = format!(
+    let text = format!(
         "Sweep of {}: {}, {}, {} settings\n{}; {}: {} lanes per instruction\n\n{LEGEND}",
         swept.name,
         count(records.chunk_by(|a, b| a.scene == b.scene).count(), "scene"),
@@ -35,28 +37,31 @@ pub fn text(records: &[Record], environment: &Environment) -> String {
         environment.instructions(),
         environment.native_lanes,
     );
-    for scene in records.chunk_by(|a, b| a.scene == b.scene) {
-        text += &format!("\n{}", scene_text(scene, swept));
-    }
-    text
+    text + &scene_texts(records, swept)
 }
 
 /// The tables of all scenes, for a file.
 pub fn tables(records: &[Record]) -> String {
-    let Some(swept) = records.iter().find_map(|r| r.swept) else { return String::new() };
-    let scenes = records.chunk_by(|a, b| a.scene == b.scene).map(|scene| scene_text(scene, swept));
-    LEGEND.to_string() + &scenes.map(|text| format!("\n{text}")).collect::<String>()
+    let swept = records.iter().find_map(|r| r.swept);
+    swept.map_or(String::new(), |swept| LEGEND.to_string() + &scene_texts(records, swept))
+}
+
+fn scene_texts(records: &[Record], swept: Swept) -> String {
+    let scenes = records.chunk_by(|a, b| a.scene == b.scene);
+    let one = |scene: &[Record]| {
+        let name = format!("{} · {}", scene[0].scene, bodies(scene[0].bodies));
+        format!("\n{name}\n{}{}", reached(scene, swept), scene_table(scene, swept).text())
+    };
+    scenes.map(one).collect()
 }
 
 fn value(record: &Record) -> f64 {
     record.swept.map_or(0.0, |s| s.value)
 }
 
-/// The values at which each solver is good enough on a scene, and the scene's table.
-fn scene_text(scene: &[Record], swept: Swept) -> String {
-    let mut text = format!("{} · {}\n", scene[0].scene, bodies(scene[0].bodies));
-    let unit = if swept.unit.is_empty() { String::new() } else { format!(" ({})", swept.unit) };
-    let heading = format!("{}{unit}", swept.name);
+/// The values at which each solver is good enough on a scene, a line each.
+pub fn reached(scene: &[Record], swept: Swept) -> String {
+    let mut text = String::new();
     let width = solvers_of(scene).iter().map(|s| s.len()).max().unwrap_or(0);
     for solver in solvers_of(scene) {
         text += &format!("  {solver:<width$}  {}\n", reach(scene, solver, swept));
@@ -68,7 +73,14 @@ fn scene_text(scene: &[Record], swept: Swept) -> String {
             );
         }
     }
-    let mut rows = table(&[
+    text
+}
+
+/// The settings of a scene by value.
+pub fn scene_table(scene: &[Record], swept: Swept) -> DocTable {
+    let unit = if swept.unit.is_empty() { String::new() } else { format!(" ({})", swept.unit) };
+    let heading = format!("{}{unit}", swept.name);
+    let head = [
         "solver",
         &heading,
         "budget",
@@ -83,15 +95,14 @@ fn scene_text(scene: &[Record], swept: Swept) -> String {
         "residual",
         "reference",
         "verdict",
-    ]);
+    ];
+    let mut rows = DocTable { wide: true, ..DocTable::new("", 1, &head) };
     for solver in solvers_of(scene) {
         let mut own: Vec<&Record> = scene.iter().filter(|r| r.solver == solver).collect();
         own.sort_by(|a, b| value(a).total_cmp(&value(b)));
-        own.into_iter().for_each(|record| {
-            rows.add_row(row(record));
-        });
+        own.into_iter().for_each(|record| rows.row(row(record)));
     }
-    text + &finish(rows, 1)
+    rows
 }
 
 /// The values at which a solver is good enough, and those at which it holds.
@@ -132,45 +143,30 @@ fn alike(scene: &[Record], solver: &str) -> Vec<Vec<f64>> {
     groups.filter(|values| values.len() > 1).collect()
 }
 
-fn row(record: &Record) -> Vec<String> {
-    const NOTHING: &str = "–";
-    let sample = record.sample.as_ref();
-    let errors = record.errors.as_ref();
-    let nothing = || NOTHING.to_string();
-    vec![
-        record.solver.to_string(),
+fn row(record: &Record) -> Vec<Cell> {
+    let nothing = || "–".to_string();
+    let time = |of: fn(&Sample) -> f64| record.sample.as_ref().map_or_else(nothing, |s| digits(of(s) / 1e3));
+    let loaded = record.sample.as_ref().filter(|s| s.load.contacts > 0.0);
+    let reference = record.truth.map(|t| t.error.map_or("missed".to_string(), |e| si(e, t.unit)));
+    let depth = ErrorAxis::Penetration.of(record).map_or_else(nothing, |depth| si(depth, "m"));
+    let residual = ErrorAxis::Law.of(record).map_or_else(nothing, ratio);
+    let order = if record.order.is_serial() { record.order.name().into() } else { record.lanes.to_string() };
+    let texts = [
         value(record).to_string(),
         record.budget_text.clone(),
-        if record.order.is_serial() { record.order.name().into() } else { record.lanes.to_string() },
-        sample.map_or_else(nothing, |l| digits(l.mean_ns / 1e3)),
-        sample.map_or_else(nothing, |l| digits(l.median_ns / 1e3)),
-        sample.map_or_else(nothing, |l| digits(l.worst_ns / 1e3)),
-        sample.map_or_else(nothing, |l| digits(l.spread_ns / 1e3)),
-        sample
-            .filter(|l| l.load.contacts > 0.0)
-            .map_or_else(nothing, |l| digits(l.mean_ns / l.load.contacts)),
-        sample.map_or_else(nothing, |l| digits(l.load.bytes_per_contact)),
-        errors.map_or_else(nothing, |e| si(e.penetration(record.tolerances.rest.is_some()), "m")),
-        errors.map_or_else(nothing, |e| ratio(e.law_rms_lighter())),
-        match record.truth {
-            None => nothing(),
-            Some(t) => t.error.map_or("missed".to_string(), |e| si(e, t.unit)),
-        },
+        order,
+        time(|s| s.mean_ns),
+        time(|s| s.median_ns),
+        time(|s| s.worst_ns),
+        time(|s| s.spread_ns),
+        loaded.map_or_else(nothing, |s| digits(s.mean_ns / s.load.contacts)),
+        loaded.map_or_else(nothing, |s| digits(s.load.bytes_per_contact)),
+        depth,
+        residual,
+        reference.unwrap_or_else(nothing),
         verdict(record),
-    ]
-}
-
-/// `good enough`, the distance from it, or the failure.
-fn verdict(record: &Record) -> String {
-    if let Some(mark) = record.mark() {
-        let step = record.broken.map(|b| b.step).or(record.failure.map(|f| f.step));
-        return step.map_or(mark.word().to_string(), |step| format!("{} at step {step}", mark.word()));
-    }
-    match record.excess() {
-        x if x <= 1.0 => "good enough".to_string(),
-        x if x.is_finite() => format!("{} × tolerance", digits(x)),
-        _ => "missed its reference".to_string(),
-    }
+    ];
+    std::iter::once(Cell::solver(record.solver)).chain(texts.map(Cell::from)).collect()
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! The matrix of `simpulse verify`, colored by margin.
 
-use super::scale::number;
+use crate::lab::chart::scale::number;
 use crate::lab::picture::Color;
-use crate::lab::picture::svg::escaped;
+use crate::lab::report::doc::{Block, Cell, DocTable, Tone};
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -33,7 +33,7 @@ struct MatrixCell {
     #[serde(default)]
     measured: Value,
     #[serde(default)]
-    truth: Value,
+    reference: Value,
     #[serde(default)]
     tolerance: Value,
 }
@@ -62,60 +62,47 @@ fn word(value: &Value) -> String {
     value.as_f64().map_or_else(|| value.as_str().unwrap_or("–").to_string(), number)
 }
 
-/// The matrix as an HTML table.
-pub fn matrix(matrix: &VerifyFile) -> String {
+/// The matrix as a table.
+pub fn matrix(matrix: &VerifyFile) -> Vec<Block> {
     let mut solvers: Vec<&str> = Vec::new();
     for outcome in &matrix.results {
         if !solvers.contains(&outcome.solver.as_str()) {
             solvers.push(&outcome.solver);
         }
     }
-    let mut text = String::from("<table class=\"numbers matrix\"><thead><tr><th>case<th>what");
-    for solver in &solvers {
-        text += &format!("<th><span>{}</span>", escaped(solver));
-    }
-    text += "</tr></thead><tbody>\n";
+    let head: Vec<&str> = ["case", "what"].into_iter().chain(solvers.iter().copied()).collect();
+    let mut rows = DocTable { class: "matrix", ..DocTable::new("", 2, &head) };
     for case in &matrix.cases {
         let star = if case.required { "*" } else { "" };
-        text += &format!("<tr><th>{}{star}<td class=\"what\">{}", escaped(&case.case), escaped(&case.what));
-        for solver in &solvers {
-            let found = matrix.results.iter().find(|o| o.case == case.case && o.solver == *solver);
-            text += &match found.map(|o| (o, o.passed)) {
-                Some((o, Some(passed))) => {
-                    let margin = margin_of(o);
-                    let (color, white) = shade(margin, passed);
-                    let ink = if white { ";color:#fff" } else { "" };
-                    let sign = if passed { "" } else { "✗ " };
-                    let shown = if margin.is_finite() { short(margin) } else { "∞".into() };
-                    let title = match &o.reason {
-                        Some(reason) => reason.clone(),
-                        None => {
-                            format!(
-                                "measured {}, reference {} ± {}",
-                                word(&o.measured),
-                                word(&o.truth),
-                                word(&o.tolerance)
-                            )
-                        }
-                    };
-                    format!(
-                        "<td style=\"background:{color}{ink}\" title=\"{}\">{sign}{shown}",
-                        escaped(&title)
-                    )
-                }
-                _ => "<td class=\"none\">n/a".into(),
-            };
-        }
-        text += "</tr>\n";
+        let cell = |solver: &&str| {
+            let found = matrix.results.iter().find(|o| o.case == case.case && o.solver == **solver);
+            found.map_or_else(|| "n/a".into(), cell_of)
+        };
+        let names = [Cell::from(format!("{}{star}", case.case)), case.what.as_str().into()];
+        rows.row(names.into_iter().chain(solvers.iter().map(cell)));
     }
-    text + "</tbody></table>\n<p class=\"soft\">A cell is error ÷ tolerance: up to 1 passes, ✗ fails. *: required of the default solver.</p>\n"
+    let legend = "A cell is error ÷ tolerance: up to 1 passes, ✗ fails. *: required of the default solver.";
+    vec![Block::Table(rows), Block::Text(Tone::Soft, legend.into())]
+}
+
+fn cell_of(outcome: &MatrixCell) -> Cell {
+    let Some(passed) = outcome.passed else { return "n/a".into() };
+    let margin = margin_of(outcome);
+    let (color, white) = shade(margin, passed);
+    let sign = if passed { "" } else { "✗ " };
+    let shown = if margin.is_finite() { short(margin) } else { "∞".into() };
+    let [measured, reference, tolerance] =
+        [&outcome.measured, &outcome.reference, &outcome.tolerance].map(word);
+    let numbers = format!("measured {measured}, reference {reference} ± {tolerance}");
+    let css = format!("background:{color};color:{}", if white { "#fff" } else { "#1f2933" });
+    Cell { css, title: outcome.reason.clone().unwrap_or(numbers), ..format!("{sign}{shown}").into() }
 }
 
 /// A number with two digits.
 fn short(margin: f64) -> String {
     match margin {
         0.0 => "0".into(),
-        m if m < 0.01 => "&lt; .01".into(),
+        m if m < 0.01 => "< .01".into(),
         m if m < 10.0 => format!("{m:.2}"),
         m if m < 1000.0 => format!("{m:.0}"),
         m if m < 9950.0 => format!("{:.1}k", 1e-3 * m),

@@ -1,21 +1,19 @@
 //! `report.html`: a study on one page that needs no network, made from the study's files.
 //!
 //! ```text
-//! study.json ──► StudyFile ──► words, overview, precision, sections ─┐
-//! verify.json ──► Matrix ───────────────────────────────────────────┼─► page
-//! replay-*.rec ──► recording::page::fragment ───────────────────────┘
+//! study.json ──► StudyFile ──► sections of paragraphs, tables, charts ─┐
+//! verify.json ──► VerifyFile ───────────────────────────────────────────┼─► page
+//! replay-*.rec ──► recording::page::fragment ───────────────────────────┘
 //! ```
 
+pub mod charts;
 mod matrix;
-mod overview;
-mod panel;
-mod precision;
-mod scale;
-mod sections;
-mod setting;
-mod sweep;
-mod words;
 
+use super::doc::{self, Block, Cell, DocTable, Tone};
+use super::style::Style;
+use super::{answer, by_scene, sweep};
+use crate::engine::clock::Phase;
+use crate::lab::chart::{THEME, legend};
 use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::picture::svg::escaped;
@@ -23,14 +21,12 @@ use crate::lab::recording::Header;
 use crate::lab::recording::page::{MOST, RecordingPanel, SCRIPT, STYLE, fragment};
 use crate::lab::recording::read::read_file;
 use crate::lab::report::study_file::StudyFile;
-use crate::lab::report::style::Style;
-use crate::lab::report::sweep::is_sweep;
+use crate::lab::study::Record;
 use crate::lab::study::curve::solvers_of;
-use crate::lab::units::{bodies, count};
+use crate::lab::units::{bodies, count, digits};
 use matrix::VerifyFile;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-pub use sweep::svg as sweep_svg;
 
 /// Name of the page in the folder of a study.
 pub const NAME: &str = "report.html";
@@ -79,144 +75,174 @@ fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, Error> {
     serde_json::from_slice(&text).map_err(|e| Error::Format { path: path.into(), message: e.to_string() })
 }
 
-/// The whole page.
-fn page(study: &StudyFile, matrix: Option<&VerifyFile>, recordings: &[(Vec<u8>, Header)]) -> String {
-    let (records, solvers) = (&study.records[..], solvers_of(&study.records));
-    let scenes = setting::scenes(records);
-    let e = &study.environment;
-    let mut text = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width\">\n<title>simpulse: contact solvers by speed and error\
-         </title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{}{STYLE}</style>\n</head>\n<body>\n\
-         <h1>Which contact solver, how fast, and how wrong?</h1>\n\
-         <p class=\"soft\">{}, {}, {} settings · {}, {} lanes native · simpulse {}</p>\n",
-        include_str!("page.css"),
-        count(scenes.len(), "scene"),
-        count(solvers.len(), "solver"),
-        records.len(),
-        escaped(&e.cpu),
-        e.native_lanes,
-        escaped(&e.version),
-    );
-    if !study.caution().is_empty() {
-        text += &format!("<p class=\"bad\">{}</p>\n", escaped(study.caution().trim_end()));
-    }
-    let mut contents: Vec<(&str, &str)> = Vec::new();
-    let mut body = String::new();
-    let mut section = |id: &'static str, title: &'static str, lead: &str, content: String| {
-        contents.push((id, title));
-        body += &format!("<section id=\"{id}\">\n<h2>{title}</h2>\n");
-        if !lead.is_empty() {
-            body += &format!("<p>{lead}</p>\n");
+/// A section of the page: its anchor, its title, and its content.
+type Section = (&'static str, &'static str, Vec<Block>);
+
+fn plain(text: &str) -> Block {
+    Block::Text(Tone::Plain, text.to_string())
+}
+
+/// The sections of a study.
+fn sections(
+    study: &StudyFile,
+    matrix: Option<&VerifyFile>,
+    recordings: &[(Vec<u8>, Header)],
+) -> Vec<Section> {
+    let records = &study.records[..];
+    let solvers = solvers_of(records);
+    let legend = || Block::Html(legend(solvers.iter().map(|s| (*s, Style::of(s)))));
+    let machine = ("machine", "Machine, settings and command", vec![Block::Html(machine(study))]);
+    if let Some(swept) = records.iter().find_map(|r| r.swept) {
+        let lead = format!(
+            "Time and errors against {}, one curve per solver. A mark is a setting at its fastest lane width; hollow marks are in natural order. Bars are the quartiles of the blocks of steps. The shaded side is within the scene’s tolerance. Settings that fail are in the strip “fails” at the top and break the curve. The settings of a scene were timed interleaved.",
+            swept.name
+        );
+        let mut blocks = vec![plain(&lead), legend()];
+        for scene in charts::scenes(records) {
+            blocks.push(Block::Heading(scene[0].scene.clone(), by_scene::scene_line(scene)));
+            blocks.push(Block::Charts("four", charts::sweep(scene, swept)));
+            blocks.push(plain(&sweep::reached(scene, swept)));
+            let folded = "All settings of this scene".to_string();
+            blocks.push(Block::Table(DocTable { folded, ..sweep::scene_table(scene, swept) }));
         }
-        body += &content;
-        body += "</section>\n";
+        return vec![("sweep", "Sweep", blocks), machine];
+    }
+    let steps = study.settings["steps"].as_u64().map(|n| n as u32);
+    let mut answer = answer::blocks(records, &study.environment, steps);
+    answer.push(plain(&study.budgets()));
+    let overview = match charts::overview(records) {
+        Some(chart) => vec![
+            plain(
+                "Small marks: every solver and budget on every scene, in colored order, at its fastest lane width. Large marks: the geometric mean of a budget over all scenes, from its first budget on each scene to its last; hollow ones omit scenes on which it fails, and their names say how many. Lower left is better; settings that fail are in the strip “fails” at the right.",
+            ),
+            legend(),
+            Block::Charts("one", vec![chart]),
+        ],
+        None => vec![plain("No setting holds on any scene.")],
     };
-    if is_sweep(records) {
-        let swept = records.iter().find_map(|r| r.swept).map_or("", |s| s.name);
+    let mut made =
+        vec![("answer", "The answer", answer), ("overview", "Speed against error over all scenes", overview)];
+    if let Some((_, first)) = recordings.first() {
         let lead = format!(
-            "Time and errors against {}, one curve per solver. A mark is a setting at its fastest lane width; hollow marks are in natural order. Bars are the quartiles of the blocks of steps. The shaded side is within the \
-             scene’s tolerance. Settings that fail are in the strip “fails” at the top and break the curve. \
-             The settings of a scene were timed interleaved.",
-            escaped(swept)
+            "{} separates the solvers most, among scenes small enough to play. Bodies are colored by their deepest overlap; arrows are impulses.",
+            first.scene
         );
-        section("sweep", "Sweep", &lead, sweep::section(records));
-        section("machine", "Machine, settings and command", "", machine(study));
-        return text + &body + "</body>\n</html>\n";
+        let panel = |(bytes, header): &(Vec<u8>, Header)| RecordingPanel {
+            bytes: bytes.clone(),
+            color: Style::of(&header.solver).color.into(),
+            header: header.clone(),
+        };
+        let panels: Vec<RecordingPanel> = recordings.iter().map(panel).collect();
+        let player = Block::Html(fragment(&panels, 0.6));
+        made.push(("replay", "Replay of the most telling scene", vec![plain(&lead), player]));
     }
-    let answer = words::answer(records, study.settings["steps"].as_u64());
-    section(
-        "answer",
-        "The answer",
-        "",
-        answer + &format!("<p>{}</p>\n", escaped(study.budgets().trim_end())),
-    );
-    section(
-        "overview",
-        "Speed against error over all scenes",
-        "Small marks: every solver and budget on every scene, in colored order, at its fastest lane width. Large marks: the geometric mean of a budget over all scenes, from its first budget on each scene to its last; hollow ones omit scenes on which it fails, and their names say how many. Lower left is better; settings that fail are in the strip “fails” at the right.",
-        overview::overview(records),
-    );
-    if !recordings.is_empty() {
-        let scene = escaped(&recordings[0].1.scene);
-        let lead = format!(
-            "{scene} separates the solvers most, among scenes small enough to play. Bodies are \
-             colored by their deepest overlap; arrows are impulses."
-        );
-        let panels: Vec<RecordingPanel> = recordings
-            .iter()
-            .cloned()
-            .map(|(bytes, header)| RecordingPanel {
-                bytes,
-                color: Style::of(&header.solver).color.into(),
-                header,
-            })
-            .collect();
-        section("replay", "Replay of the most telling scene", &lead, fragment(&panels, 0.6));
+    let mut by_scenes = vec![
+        plain(
+            "A mark is a setting at its fastest lane width; larger marks are larger budgets, hollow ones natural order. Beside those of the front stand budget (substeps · sweeps) and lanes. Bars are the quartiles of its blocks of steps. The gray line is the front: settings that no other beats in time and error. The shaded side is within the scene’s tolerance. What fails is at the right edge. Point at a mark for its numbers.",
+        ),
+        legend(),
+    ];
+    for scene in charts::scenes(records) {
+        let (table, notes) = by_scene::scene_table(scene);
+        let folded = "All settings of this scene".to_string();
+        by_scenes.extend([
+            Block::Heading(scene[0].scene.clone(), bodies(scene[0].bodies)),
+            Block::Charts("three", charts::precision(scene)),
+            Block::Table(DocTable { folded, ..table }),
+            Block::Text(Tone::Bad, notes),
+        ]);
     }
-    let mut by_scene = panel::legend(&solvers);
-    for scene in scenes {
-        let name = &scene[0].scene;
-        by_scene += &format!(
-            "<h3 id=\"{}\">{} <span class=\"soft\">{}</span></h3>\n{}",
-            words::anchor(name),
-            escaped(name),
-            bodies(scene[0].bodies),
-            precision::scene(scene)
-        );
+    by_scenes.push(Block::Text(Tone::Soft, by_scene::LEGEND.to_string()));
+    made.push(("scenes", "Scene by scene", by_scenes));
+    let mut profiles = vec![
+        plain(
+            "The share of scenes that a solver solves within a factor of the fastest. Upper left is better. Lines that coincide are drawn beside each other.",
+        ),
+        legend(),
+        Block::Charts("three", charts::profiles(records)),
+        Block::Table(by_scene::profile_table(records)),
+    ];
+    profiles.extend(by_scene::order_tables(records).into_iter().map(Block::Table));
+    made.push(("profiles", "Performance profiles", profiles));
+    let lanes = charts::over_lanes(records);
+    if !lanes.is_empty() {
+        let lead = "Each solver at the middle one of its budgets in colored order: speed-up over one lane, and the share of lanes that hold a contact.";
+        made.push(("lanes", "Lanes", vec![plain(lead), legend(), Block::Charts("four", lanes)]));
     }
-    section(
-        "scenes",
-        "Scene by scene",
-        "A mark is a setting at its fastest lane width; larger marks are larger budgets, hollow ones natural order. \
-         Beside those of the front stand budget (substeps · sweeps) and lanes. Bars are the quartiles of its blocks of steps. \
-         The gray line is the front: settings that no other beats in time and error. The shaded side is within the \
-         scene’s tolerance. What fails is at the right edge. Point at a mark for its numbers.",
-        by_scene,
-    );
-    let legend = || panel::legend(&solvers);
-    section(
-        "profiles",
-        "Performance profiles",
-        "The share of scenes that a solver solves within a factor of the fastest. Upper left is better. Lines that coincide are drawn beside each other.",
-        legend() + &sections::profiles(records),
-    );
-    section(
-        "lanes",
-        "Lanes",
-        "Each solver at the middle one of its budgets in colored order: speed-up over one lane, and the share of lanes that hold a contact.",
-        legend() + &sections::lanes(records),
-    );
-    section(
-        "phases",
-        "Time per phase",
-        "Each solver at the middle one of its budgets and its fastest lane width (budget@lanes); ✗ where it does not hold.",
-        sections::phases(records),
-    );
-    section(
-        "iterations",
-        "Iterations against error",
-        "Constraint sweeps per step, of every kind; settings that hold, in colored order.",
-        legend() + &sections::iterations(records),
-    );
+    let lead = "Each solver at the middle one of its budgets and its fastest lane width (budget@lanes): median time of each phase (µs), and its share.";
+    let phases = std::iter::once(plain(lead)).chain(phases(records)).collect();
+    made.push(("phases", "Time per phase", phases));
+    let lead = "Constraint sweeps per step, of every kind; settings that hold, in colored order.";
+    let iterations = Block::Charts("four", charts::iterations(records));
+    made.push(("iterations", "Iterations against error", vec![plain(lead), legend(), iterations]));
     let cases = match matrix {
         Some(found) => matrix::matrix(found),
-        None => "<p>Not run. <code>simpulse verify --json &gt; DIR/verify.json</code> and then \
-                 <code>simpulse study --from DIR</code> adds it here.</p>\n"
-            .into(),
+        None => vec![plain(
+            "Not run. `simpulse verify --json > DIR/verify.json` and then `simpulse study --from DIR` adds it here.",
+        )],
     };
-    section("verify", "Hard cases with known reference values", "", cases);
-    section("machine", "Machine, settings and command", "", machine(study));
-    text += "<nav>";
-    for (id, title) in &contents {
-        text += &format!("<a href=\"#{id}\">{title}</a> ");
-    }
-    text += "</nav>\n";
-    text += &body;
-    if !recordings.is_empty() {
-        text += &format!("<script>\n{SCRIPT}</script>\n");
-    }
-    text + "</body>\n</html>\n"
+    made.push(("verify", "Hard cases with known reference values", cases));
+    made.push(machine);
+    made
+}
+
+/// Median time per phase: a table per scene, a line per solver, shaded by its share.
+fn phases(records: &[Record]) -> Vec<Block> {
+    let used: Vec<Phase> = Phase::ALL
+        .into_iter()
+        .filter(|&p| records.iter().any(|r| r.sample.as_ref().is_some_and(|s| s.phase_ns[p as usize] > 0.0)))
+        .collect();
+    let table = |scene: &[Record]| {
+        let mut head = vec!["solver", "setting"];
+        head.extend(used.iter().map(|phase| phase.name()));
+        let mut rows = DocTable { class: "phases", ..DocTable::new(scene[0].scene.clone(), 2, &head) };
+        for record in solvers_of(records).into_iter().filter_map(|solver| charts::standard(scene, solver)) {
+            let Some(sample) = &record.sample else { continue };
+            let whole: f64 = sample.phase_ns.iter().sum();
+            let broken = if record.holds() { "" } else { " ✗" };
+            let cell = |&phase: &Phase| {
+                let ns = sample.phase_ns[phase as usize];
+                let share = (100.0 * ns / whole.max(1.0)).round();
+                let css = format!("--share: {share}%");
+                Cell { css, title: format!("{share} %"), ..digits(1e-3 * ns).into() }
+            };
+            let setting = Cell::from(charts::short_words(record) + broken);
+            rows.row([Cell::solver(record.solver), setting].into_iter().chain(used.iter().map(cell)));
+        }
+        Block::Table(rows)
+    };
+    charts::scenes(records).into_iter().map(table).collect()
+}
+
+/// The whole page.
+fn page(study: &StudyFile, matrix: Option<&VerifyFile>, recordings: &[(Vec<u8>, Header)]) -> String {
+    let sections = sections(study, matrix, recordings);
+    let e = &study.environment;
+    let head = format!(
+        "{}, {}, {} settings · {}, {} lanes native · simpulse {}",
+        count(charts::scenes(&study.records).len(), "scene"),
+        count(solvers_of(&study.records).len(), "solver"),
+        study.records.len(),
+        e.cpu,
+        e.native_lanes,
+        e.version,
+    );
+    let top = [Block::Text(Tone::Soft, head), Block::Text(Tone::Bad, study.caution())];
+    let link = |(id, title, _): &Section| format!("<a href=\"#{id}\">{title}</a> ");
+    let body = |(id, title, blocks): &Section| {
+        format!("<section id=\"{id}\">\n<h2>{title}</h2>\n{}</section>\n", doc::html(blocks))
+    };
+    let script = if recordings.is_empty() { String::new() } else { format!("<script>\n{SCRIPT}</script>\n") };
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width\">\n<title>simpulse: contact solvers by speed and error\
+         </title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{THEME}{}{STYLE}</style>\n</head>\n<body>\n\
+         <h1>Which contact solver, how fast, and how wrong?</h1>\n{}<nav>{}</nav>\n{}{script}</body>\n</html>\n",
+        include_str!("page.css"),
+        doc::html(&top),
+        sections.iter().map(link).collect::<String>(),
+        sections.iter().map(body).collect::<String>(),
+    )
 }
 
 fn machine(study: &StudyFile) -> String {
@@ -375,7 +401,7 @@ mod tests {
             "lanes filled",
             "time per phase",
             "sweeps of a step",
-            "penetration, 99 % or at rest",
+            "speed-up over 1 lane",
             "load of &lt;ground&gt;",
             "2 kN",
             "simpulse study --quick --scenes",
@@ -397,8 +423,8 @@ mod tests {
         let Style { color, .. } = Style::of("soft_step");
         for records in [&all[..], &alone] {
             let page = page(&read(records), None, &[]);
-            assert!(page.contains(&panel::legend(&["soft_step"])[18..]), "legend");
-            assert!(page.contains(&format!("stroke=\"{color}\"")));
+            assert!(page.contains(&legend([("soft_step", Style::of("soft_step"))])[18..80]), "legend");
+            assert!(page.contains(&format!("stroke=\"{}\"", color.to_uppercase())));
         }
         assert_ne!(Style::of("pgs"), Style::of("soft_step"));
     }
@@ -409,10 +435,10 @@ mod tests {
             {"case":"A1","solver":"a","passed":true,"margin":0.5,"measured":1,"reference":1,"tolerance":2},
             {"case":"A1","solver":"b","passed":false,"margin":"inf","reason":"diverged"},
             {"case":"A1","solver":"c","passed":null,"reason":"n/a"}]}"#;
-        let text = matrix::matrix(&serde_json::from_str(json).unwrap());
-        assert!(
-            text.contains("A1*") && text.contains(">0.50") && text.contains("✗ ∞") && text.contains("n/a")
-        );
+        let text = doc::html(&matrix::matrix(&serde_json::from_str(json).unwrap()));
+        for part in ["A1*", ">0.50", "✗ ∞", "n/a", "measured 1, reference 1 ± 2"] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
         assert!(text.contains("background:#93c1dd"), "{text}");
     }
 

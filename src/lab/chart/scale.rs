@@ -105,7 +105,7 @@ impl Scale {
 }
 
 /// `1 mm`, `20 kN`, `0.05`, `10⁻⁶`, `3×`, `50 %`.
-pub fn label(value: f64, unit: &str) -> String {
+fn label(value: f64, unit: &str) -> String {
     match unit {
         "" => number(value),
         "×" => format!("{}×", number(value)),

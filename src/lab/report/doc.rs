@@ -1,0 +1,274 @@
+//! A document: paragraphs, tables and charts, with a writer of text for a terminal and one of HTML for the page.
+
+use super::style::Style;
+use super::table::{PAGE_WIDTH, finish, narrow, table};
+use crate::lab::chart::Chart;
+use crate::lab::picture::svg::escaped;
+use crate::lab::units::wrapped;
+
+/// How a text is meant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tone {
+    /// As it stands.
+    #[default]
+    Plain,
+    /// The first sentences.
+    Lead,
+    /// An explanation.
+    Soft,
+    /// A failure or a warning.
+    Bad,
+    /// Within every tolerance.
+    Good,
+}
+
+impl Tone {
+    fn class(self) -> &'static str {
+        match self {
+            Tone::Plain => "",
+            Tone::Lead => "lead",
+            Tone::Soft => "soft",
+            Tone::Bad => "bad",
+            Tone::Good => "ok",
+        }
+    }
+}
+
+/// A cell of a table.
+#[derive(Clone, Debug, Default)]
+pub struct Cell {
+    /// Its text.
+    pub text: String,
+    /// On a page: shown when the mouse is over it.
+    pub title: String,
+    /// How it is meant.
+    pub tone: Tone,
+    /// On a page: a marker before the text.
+    pub style: Option<Style>,
+    /// On a page: where it leads; empty for nowhere.
+    pub link: String,
+    /// On a page: CSS of the cell.
+    pub css: String,
+}
+
+impl<T: Into<String>> From<T> for Cell {
+    fn from(text: T) -> Cell {
+        Cell { text: text.into(), ..Cell::default() }
+    }
+}
+
+impl Cell {
+    /// The name of a solver, with its marker.
+    pub fn solver(name: &str) -> Cell {
+        Cell { style: Some(Style::of(name)), ..name.into() }
+    }
+
+    /// The name of a scene, which leads to its charts.
+    pub fn scene(name: &str) -> Cell {
+        Cell { link: anchor(name), ..name.into() }
+    }
+
+    /// The same cell in another tone.
+    pub fn tone(self, tone: Tone) -> Cell {
+        Cell { tone, ..self }
+    }
+
+    fn html(&self, element: &str, left: bool) -> String {
+        let mut classes = vec![self.tone.class()];
+        classes.extend(left.then_some("left"));
+        let classes = classes.join(" ");
+        let attribute = |name: &str, value: &str| match value.trim() {
+            "" => String::new(),
+            value => format!(" {name}=\"{}\"", escaped(value)),
+        };
+        let mut text = escaped(&self.text);
+        if !self.link.is_empty() {
+            text = format!("<a href=\"#{}\">{text}</a>", self.link);
+        }
+        if let Some(Style { color, marker }) = self.style {
+            let color = if color == "#222222" { "var(--black)" } else { color };
+            let path = marker.path([7.0, 7.0], 5.0);
+            let svg = format!(
+                "<svg class=\"mark\" viewBox=\"0 0 14 14\"><path d=\"{path}\" fill=\"{color}\"/></svg>"
+            );
+            text = svg + &text;
+        }
+        let attributes = [("class", &classes), ("title", &self.title), ("style", &self.css)];
+        let attributes: String = attributes.into_iter().map(|(name, value)| attribute(name, value)).collect();
+        format!("<{element}{attributes}>{text}")
+    }
+}
+
+/// Anchor of a scene on the page.
+pub fn anchor(scene: &str) -> String {
+    let safe = scene.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' });
+    format!("scene-{}", safe.collect::<String>())
+}
+
+/// A table.
+#[derive(Clone, Debug, Default)]
+pub struct DocTable {
+    /// Text above it.
+    pub caption: String,
+    /// Names of the columns.
+    pub head: Vec<String>,
+    /// Cells.
+    pub rows: Vec<Vec<Cell>>,
+    /// Number of columns that are aligned at the left; others are at the right.
+    pub left: usize,
+    /// As text: whether it may be wider than a terminal page.
+    pub wide: bool,
+    /// As text: only so many rows; all for 0.
+    pub most: usize,
+    /// On a page: the words that unfold it; empty if it is not folded.
+    pub folded: String,
+    /// On a page: its CSS class.
+    pub class: &'static str,
+}
+
+impl DocTable {
+    /// A table without rows.
+    pub fn new(caption: impl Into<String>, left: usize, head: &[&str]) -> DocTable {
+        let head = head.iter().map(|name| name.to_string()).collect();
+        DocTable { caption: caption.into(), left, head, ..DocTable::default() }
+    }
+
+    /// Adds a row.
+    pub fn row<C: Into<Cell>>(&mut self, cells: impl IntoIterator<Item = C>) {
+        self.rows.push(cells.into_iter().map(Into::into).collect());
+    }
+
+    /// The table as text.
+    pub fn text(&self) -> String {
+        let head: Vec<&str> = self.head.iter().map(String::as_str).collect();
+        let mut rows = table(&head);
+        let most = if self.most == 0 { usize::MAX } else { self.most };
+        for row in self.rows.iter().take(most) {
+            rows.add_row(row.iter().map(|cell| cell.text.clone()));
+        }
+        let body = finish(if self.wide { rows } else { narrow(rows, PAGE_WIDTH) }, self.left);
+        let more = match self.rows.len().saturating_sub(most) {
+            0 => String::new(),
+            more => format!("and {more} more in report.html\n"),
+        };
+        lines(&self.caption) + &if self.rows.is_empty() { String::new() } else { body } + &more
+    }
+
+    fn html(&self) -> String {
+        let class = format!("numbers {}", self.class);
+        let mut text = format!("<table class=\"{}\">", class.trim());
+        if !self.caption.is_empty() && self.folded.is_empty() {
+            text += &format!("<caption>{}</caption>", escaped(&self.caption));
+        }
+        let head = |(i, name): (usize, &String)| {
+            Cell::from(name.trim().replace('\n', " ")).html("th", i < self.left)
+        };
+        text += &format!(
+            "<thead><tr>{}</tr></thead><tbody>\n",
+            self.head.iter().enumerate().map(head).collect::<String>()
+        );
+        for row in &self.rows {
+            let cell = |(i, c): (usize, &Cell)| c.html(if i == 0 { "th" } else { "td" }, i < self.left);
+            text += &format!("<tr>{}</tr>\n", row.iter().enumerate().map(cell).collect::<String>());
+        }
+        text += "</tbody></table>\n";
+        match self.folded.as_str() {
+            "" => text,
+            words => format!("<details><summary>{}</summary>\n{text}</details>\n", escaped(words)),
+        }
+    }
+}
+
+/// A part of a document.
+#[derive(Clone, Debug)]
+pub enum Block {
+    /// Name of a part, with a remark; scenes are anchors.
+    Heading(String, String),
+    /// A paragraph. Line breaks stay.
+    Text(Tone, String),
+    /// A table.
+    Table(DocTable),
+    /// Charts in a grid of this CSS class; pages only.
+    Charts(&'static str, Vec<Chart>),
+    /// Anything else; pages only.
+    Html(String),
+}
+
+/// The document as text, in lines of at most 120 characters except for wide tables.
+pub fn text(blocks: &[Block]) -> String {
+    let one = |block: &Block| match block {
+        Block::Heading(name, remark) if remark.is_empty() => format!("\n{name}\n"),
+        Block::Heading(name, remark) => format!("\n{name} · {remark}\n"),
+        Block::Text(_, text) if text.is_empty() => String::new(),
+        Block::Text(Tone::Lead, text) => lines(text) + "\n",
+        Block::Text(Tone::Soft, text) => format!("\n{}", lines(text)),
+        Block::Text(_, text) => lines(text),
+        Block::Table(table) => format!("\n{}", table.text()),
+        Block::Charts(..) | Block::Html(_) => String::new(),
+    };
+    blocks.iter().map(one).collect()
+}
+
+/// The lines of a text, each wrapped to [`PAGE_WIDTH`].
+pub fn lines(text: &str) -> String {
+    let whole = text.lines().flat_map(|line| match line.trim().is_empty() {
+        true => vec![String::new()],
+        false => wrapped(line, PAGE_WIDTH),
+    });
+    whole.map(|line| line + "\n").collect()
+}
+
+/// The document as HTML.
+pub fn html(blocks: &[Block]) -> String {
+    let one = |block: &Block| match block {
+        Block::Heading(name, remark) => {
+            let (id, name, remark) = (anchor(name), escaped(name), escaped(remark));
+            format!("<h3 id=\"{id}\">{name} <span class=\"soft\">{remark}</span></h3>\n")
+        }
+        Block::Text(_, text) if text.trim().is_empty() => String::new(),
+        Block::Text(tone, text) => {
+            // Every second part stands between backquotes.
+            let safe = escaped(text.trim());
+            let parts = safe.split('`').enumerate();
+            let marked = parts.map(|(i, part)| if i % 2 == 1 { format!("<code>{part}</code>") } else { part.into() });
+            let lines = marked.collect::<String>().replace('\n', "<br/>\n");
+            format!("<p class=\"{}\">{lines}</p>\n", tone.class())
+        }
+        Block::Table(table) if table.rows.is_empty() => String::new(),
+        Block::Table(table) => table.html(),
+        Block::Charts(class, charts) => {
+            let charts: String = charts.iter().map(Chart::svg).collect();
+            format!("<div class=\"panels {class}\">\n{charts}</div>\n")
+        }
+        Block::Html(html) => html.clone(),
+    };
+    blocks.iter().map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_document_reads_the_same_in_a_terminal_and_on_a_page() {
+        let mut table = DocTable::new("caption", 1, &["solver", "time\nµs"]);
+        table.row([Cell::solver("pgs"), "12.3".into()]);
+        table.row([Cell::scene("a<b"), Cell::from("fell").tone(Tone::Bad)]);
+        table.most = 1;
+        let blocks = [Block::Text(Tone::Bad, "x & y ".repeat(30)), Block::Table(table)];
+        let terminal = text(&blocks);
+        assert!(terminal.lines().all(|line| line.chars().count() <= PAGE_WIDTH), "{terminal}");
+        assert!(terminal.contains("pgs") && terminal.contains("and 1 more in report.html"), "{terminal}");
+        let page = html(&blocks);
+        for part in [
+            "x &amp; y",
+            "<caption>caption",
+            "a&lt;b</a>",
+            "class=\"bad\">fell",
+            "href=\"#scene-a-b\"",
+            "time µs",
+        ] {
+            assert!(page.contains(part), "{part}: {page}");
+        }
+    }
+}
