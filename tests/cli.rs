@@ -419,7 +419,7 @@ fn shells_complete_options_and_their_values() {
     for shell in ["bash", "zsh", "fish"] {
         let output = simpulse(folder.path(), &["completions", shell]);
         let script = text(&output.stdout);
-        for word in ["--solvers", "soft_step", "converge", "warm-start"] {
+        for word in ["--solvers", "soft_step", "converge", "--freeze"] {
             let word = if shell == "fish" { word.trim_start_matches("--") } else { word };
             assert!(script.contains(word), "{shell}: {word}");
         }

@@ -99,7 +99,7 @@ fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> Strin
     if ranking.leader().is_none() && ranking.first.len() > 1 {
         text += &format!(
             "  By speed there is no clear leader: with a scene left out or other tolerances, first is one of {}.",
-            ranking.first.join(", ")
+            short_list(&ranking.first, 8)
         );
     }
     if let Some(place) = standings.iter().position(|s| s.solver == DEFAULT) {
@@ -119,8 +119,8 @@ fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> Strin
 }
 
 /// The first few of a list.
-fn short_list(names: &[String], most: usize) -> String {
-    let shown = names.iter().take(most).cloned().collect::<Vec<_>>().join(", ");
+fn short_list(names: &[impl AsRef<str>], most: usize) -> String {
+    let shown = names.iter().take(most).map(AsRef::as_ref).collect::<Vec<&str>>().join(", ");
     if names.len() > most { format!("{shown} and {} more", names.len() - most) } else { shown }
 }
 

@@ -15,7 +15,8 @@ use crate::lab::scenes::holds::Demand;
 use crate::lab::scenes::tolerance::{GivenTolerances, Tolerance, Tolerances};
 use crate::lab::scenes::{self, Loaded, Scene};
 use crate::lab::units::si;
-use crate::lab::{files, memory};
+use crate::lab::files;
+use crate::lab::memory;
 use std::sync::Arc;
 
 /// Everything that a study runs.
