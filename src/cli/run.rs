@@ -317,7 +317,11 @@ impl RunResult {
         let demanded = self.unchecked.iter().all(|what| !what.contains("file"));
         let yes = if demanded { "yes" } else { "not checked" };
         lines.extend([
-            ("contact-law residual, rms", ratio(e.law_rms_lighter()), "weights of the lighter body × step".into()),
+            (
+                "contact-law residual, rms",
+                ratio(e.law_rms_lighter()),
+                "weights of the lighter body × step".into(),
+            ),
             ("distance to reference value", distance, known),
             ("behavior", String::new(), String::new()),
             (
@@ -344,7 +348,9 @@ impl RunResult {
         text += &self.unchecked.iter().map(|what| format!("not checked: {what}\n")).collect::<String>();
         text += &self.times.note();
         text + &match all {
-            true => format!("\n{}{}\nerrors\n{}", self.times.table(), counts(world), error_list(&self.errors)),
+            true => {
+                format!("\n{}{}\nerrors\n{}", self.times.table(), counts(world), error_list(&self.errors))
+            }
             false => "--all prints the rest\n".to_string(),
         }
     }

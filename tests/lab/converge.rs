@@ -7,9 +7,9 @@ use simpulse::engine::params::Budget;
 use simpulse::engine::solvers::{self, Law, VARIANTS, Variant};
 use simpulse::engine::world::{Order, Settings, World};
 use simpulse::lab::capture::capture;
+use simpulse::lab::chart::Style;
 use simpulse::lab::converge::replay::{Replay, Replayed, Sequence, Start};
 use simpulse::lab::converge::{ConvergeOptions, ConvergeReport, ReplayCurve, converge, plot, table};
-use simpulse::lab::chart::Style;
 use simpulse::lab::reference::certify::{Uniqueness, reference};
 use simpulse::lab::reference::frozen::Frozen;
 use simpulse::lab::reference::gallery::{

@@ -7,7 +7,7 @@
 use super::replay::{Sequence, Start};
 use super::warm::WarmStartSource;
 use super::{ConvergeReport, CurvePoint, Reached, ReplayCurve, TOLERANCES};
-use crate::lab::chart::{self, Axis, Chart, Mark, Scale, Series, Strip, Style};
+use crate::lab::chart::{self, Axis, Chart, ChartMark, Scale, Series, FailStrip, Style};
 
 /// Residuals that are shown. Values outside are drawn at the edge.
 const SHOWN: [f64; 2] = [1e-8, 10.0];
@@ -16,7 +16,7 @@ const SHOWN: [f64; 2] = [1e-8, 10.0];
 pub type Styles<'a> = &'a dyn Fn(&str) -> Style;
 
 /// A row of charts: a law and a start.
-struct Law {
+struct LawRow {
     title: String,
     start: Start,
     residual: fn(&CurvePoint) -> Option<f64>,
@@ -32,7 +32,7 @@ pub fn svg(report: &ConvergeReport, styles: Styles) -> String {
         }
     }
     let timed = report.curves.iter().any(|c| c.iteration.is_some());
-    let row = |law: &Law| {
+    let row = |law: &LawRow| {
         let notes = coinciding(report, law);
         let by_sweeps = chart(report, law, styles, false);
         let by_time = timed.then(|| chart(report, law, styles, true));
@@ -40,22 +40,25 @@ pub fn svg(report: &ConvergeReport, styles: Styles) -> String {
     };
     let rows: Vec<(String, Vec<Chart>)> = laws(report).iter().map(row).collect();
     let names: Vec<(&str, Style)> = solvers.into_iter().map(|s| (s, styles(name(s)))).collect();
-    let title = format!("{}: residual against work; solid: natural order, dashed: colored or shuffled", report.problem);
+    let title = format!(
+        "{}: residual against work; solid: natural order, dashed: colored or shuffled",
+        report.problem
+    );
     chart::file(&title, &names, &rows)
 }
 
-fn laws(report: &ConvergeReport) -> Vec<Law> {
+fn laws(report: &ConvergeReport) -> Vec<LawRow> {
     let starts = [Start::Cold, Start::Warm].into_iter();
     let known = starts.filter(|s| *s == Start::Cold || report.warm_start != WarmStartSource::None);
     let both = |start: Start| {
-        let rigid = Law {
+        let rigid = LawRow {
             title: format!("Rigid law, {start} start"),
             start,
             residual: |p| Some(p.rigid),
             reached: |c| &c.rigid,
         };
         let title = format!("Solver's own law, {start} start");
-        [rigid, Law { title, start, residual: |p| p.own, reached: |c| &c.own }]
+        [rigid, LawRow { title, start, residual: |p| p.own, reached: |c| &c.own }]
     };
     known.flat_map(both).collect()
 }
@@ -66,7 +69,7 @@ fn name(curve: &str) -> &str {
 }
 
 /// A note on solvers whose curves coincide under a law, `a = b`; empty if there are none.
-fn coinciding(report: &ConvergeReport, law: &Law) -> String {
+fn coinciding(report: &ConvergeReport, law: &LawRow) -> String {
     let curves = report.curves.iter().filter(|c| c.start == law.start);
     let values = |c: &ReplayCurve| c.points.iter().map(|p| (p.sweeps, (law.residual)(p))).collect::<Vec<_>>();
     let mut groups: Vec<(&ReplayCurve, Vec<&str>)> = Vec::new();
@@ -85,7 +88,7 @@ fn coinciding(report: &ConvergeReport, law: &Law) -> String {
 }
 
 /// The chart of a law against sweeps, or against time; `None` if nothing was measured.
-fn chart(report: &ConvergeReport, law: &Law, styles: Styles, by_time: bool) -> Option<Chart> {
+fn chart(report: &ConvergeReport, law: &LawRow, styles: Styles, by_time: bool) -> Option<Chart> {
     // If a solver's result does not depend on the start, its cold curve stands for both.
     let remembers = |c: &ReplayCurve| {
         let same = |o: &&ReplayCurve| o.solver == c.solver && o.order == c.order && o.start == Start::Warm;
@@ -108,7 +111,7 @@ fn chart(report: &ConvergeReport, law: &Law, styles: Styles, by_time: bool) -> O
                     let (solver, order) = (&curve.solver, &curve.order);
                     format!("{solver}, {order}: {:.0e} after {} iterations", TOLERANCES[k], point.iterations)
                 });
-                Some(Mark { hollow: curve.order == Sequence::Colored, ..Mark::at(x, y, size, title) })
+                Some(ChartMark { hollow: curve.order == Sequence::Colored, ..ChartMark::at(x, y, size, title) })
             };
             let marks = curve.points.iter().enumerate().filter_map(mark).collect();
             let (dashed, single) = (curve.order != Sequence::Natural, curve.arithmetic == "f32");
@@ -126,7 +129,7 @@ fn chart(report: &ConvergeReport, law: &Law, styles: Styles, by_time: bool) -> O
         title: String::new(),
         x: Axis { name: name.into(), scale: Scale::log(xs, unit) },
         y: Axis { name: "residual".into(), scale: y },
-        strip: Strip::None,
+        strip: FailStrip::None,
         good: [None; 2],
         series,
     })
