@@ -283,7 +283,7 @@ fn the_answer_comes_first_and_fills_a_page_at_most() {
     assert!(errors(&output).is_empty(), "progress is for terminals: {}", text(&output.stderr));
     let (answer, tables) = text(&output.stdout).split_once("\nbudget: substeps").unwrap();
     assert!(answer.lines().count() <= 60 && answer.contains("Ranking over all scenes"), "{answer}");
-    assert!(tables.contains("Performance profiles"));
+    assert!(tables.contains("speed-up: over 1 lane") && tables.contains("Performance profiles"));
     let widest = answer.lines().map(|line| line.chars().count()).max();
     assert!(widest <= Some(120), "{answer}");
 }

@@ -8,7 +8,6 @@ use crate::lab::converge::{ConvergeOptions, converge_watched, plot, table};
 use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::overrides;
-use crate::lab::picture::axes::with_dark;
 use crate::lab::reference::ContactProblem;
 use crate::lab::reference::certify::{Reference, reference};
 use crate::lab::reference::frozen::Frozen;
@@ -170,7 +169,7 @@ pub fn run(args: &ConvergeArgs) -> Result<ExitCode, Error> {
     let files = [
         ("converge.csv", table::csv(&report)?),
         ("converge.json", json.clone()),
-        ("converge.svg", with_dark(&plot::svg(&report, &|solver| Style::of(solver).rgb())?)),
+        ("converge.svg", plot::svg(&report, &Style::of)),
     ];
     for (name, text) in &files {
         files::write(&args.out.join(name), text.as_bytes())?;

@@ -299,7 +299,11 @@ impl RunResult {
             (false, false) => "yes",
         };
         lines.extend([
-            ("contact-law residual, rms", ratio(e.law_rms_lighter()), "weights of the lighter body × step".into()),
+            (
+                "contact-law residual, rms",
+                ratio(e.law_rms_lighter()),
+                "weights of the lighter body × step".into(),
+            ),
             ("distance to reference value", distance, known),
             ("behavior", String::new(), String::new()),
             (
@@ -326,7 +330,9 @@ impl RunResult {
         text += &self.unchecked.iter().map(|what| format!("not checked: {what}\n")).collect::<String>();
         text += &self.times.note();
         text + &match all {
-            true => format!("\n{}{}\nerrors\n{}", self.times.table(), counts(world), error_list(&self.errors)),
+            true => {
+                format!("\n{}{}\nerrors\n{}", self.times.table(), counts(world), error_list(&self.errors))
+            }
             false => "--all prints the rest\n".to_string(),
         }
     }

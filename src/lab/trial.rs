@@ -14,7 +14,7 @@
 //!     Ok(())
 //! })?;
 //! assert!(found.failure.is_none() && found.broken.is_none() && highest < 2.6);
-//! assert!(found.errors.is_some_and(|errors| errors.penetration_max < 0.01));
+//! assert!(found.errors.is_some_and(|errors| errors.penetration_max() < 0.01));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

@@ -8,11 +8,11 @@ use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::VARIANTS;
 use simpulse::engine::world::{Order, Settings, World};
 use simpulse::lab::capture::capture;
+use simpulse::lab::chart::Style;
 use simpulse::lab::converge::{self, ConvergeOptions};
 use simpulse::lab::error::Error;
 use simpulse::lab::metrics::Observation;
 use simpulse::lab::overrides::{self, Override};
-use simpulse::lab::picture::Color;
 use simpulse::lab::reference::certify::reference;
 use simpulse::lab::reference::frozen::Frozen;
 use simpulse::lab::scenes::{self, Scene};
@@ -163,12 +163,8 @@ pub fn frozen(input: &[u8], salt: u64) -> Result<bool, String> {
     match converge::converge(problem, known.as_ref(), &options) {
         Ok(report) => {
             converge::table::text(&report);
-            let written = [
-                converge::table::csv(&report),
-                converge::table::json(&report),
-                converge::plot::svg(&report, &|_| Color::rgb(0)),
-            ];
-            for text in written {
+            converge::plot::svg(&report, &|_| Style::at(0));
+            for text in [converge::table::csv(&report), converge::table::json(&report)] {
                 text.map_err(|e| format!("report: not written, {e}"))?;
             }
         }

@@ -136,7 +136,7 @@ fn the_program_prints_evidence_and_writes_it() {
         "Stands for 60 s (checked)",
         "runner-up: ",
         "slower",
-        "penetration max",
+        "penetration_max_m",
         "±",
         "to run it: simpulse run stack:3 --solver ",
     ] {

@@ -7,9 +7,9 @@ use simpulse::engine::params::Budget;
 use simpulse::engine::solvers::{self, Law, VARIANTS, Variant};
 use simpulse::engine::world::{Order, World};
 use simpulse::lab::capture::capture;
+use simpulse::lab::chart::Style;
 use simpulse::lab::converge::replay::{Replay, Replayed, Sequence, Start};
 use simpulse::lab::converge::{ConvergeOptions, ConvergeReport, ReplayCurve, converge, plot, table};
-use simpulse::lab::picture::Color;
 use simpulse::lab::reference::certify::{Uniqueness, reference};
 use simpulse::lab::reference::frozen::Frozen;
 use simpulse::lab::reference::gallery::{
@@ -436,7 +436,7 @@ fn reports_say_what_was_measured() {
         (json["curves"].as_array().unwrap().len(), &json["contacts"]),
         (report.curves.len(), &4.into())
     );
-    let svg = plot::svg(&report, &|_| Color::rgb(0)).unwrap();
+    let svg = plot::svg(&report, &|_| Style::at(0));
     assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>") && !svg.contains("NaN"));
 
     // Without a reference, there is nothing to perturb into a warm start.

@@ -72,7 +72,10 @@ fn texts(page: &Path, extra: &str) -> Option<serde_json::Value> {
 fn the_page_of_a_sweep_is_whole_in_a_browser() {
     let folder = tempfile::tempdir().unwrap();
     succeeds(folder.path(), "study --quick --scenes stack:12,mass_ratio --sweep substeps=1,2,4,8,16 --out r");
-    let found = texts(&folder.path().join("r/report.html"), "curves: count(\"svg.chart polyline[stroke-width='2']\")");
+    let found = texts(
+        &folder.path().join("r/report.html"),
+        "curves: count(\"svg.chart polyline[stroke-width='2']\")",
+    );
     let Some(found) = found else { return };
     // Time and three errors on two scenes, with a curve or two for most of seven solvers.
     assert_eq!(found["plots"], 2 * 4, "{found}");

@@ -88,6 +88,7 @@ const KINDS: [PairKind; 2] = [PairKind::Rectangles, PairKind::Hulls];
 
 /// The poses at which a manifold was found.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct FrozenManifold {
     /// Sort key of [`Candidates`].
     pair: u64,
@@ -101,11 +102,14 @@ struct FrozenManifold {
 
 /// The frozen contacts of a world, see the [module](self).
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FrozenContacts {
     /// By kind, sorted by pair.
     found: [Vec<FrozenManifold>; KINDS.len()],
+    #[cfg_attr(feature = "serde", serde(skip))]
     last_found: [Vec<FrozenManifold>; KINDS.len()],
     /// Whether the manifold of each candidate is kept in this step; empty if nothing is frozen. `[candidates]`
+    #[cfg_attr(feature = "serde", serde(skip))]
     keep: Vec<bool>,
 }
 

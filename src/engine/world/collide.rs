@@ -30,7 +30,7 @@ pub(super) struct Narrow {
     pub jobs_are_current: bool,
     /// The solver's requests to the collision phase.
     asked: Collision,
-    frozen: FrozenContacts,
+    pub frozen: FrozenContacts,
     /// Farthest point of each body from its center, 0 if it is static (m); only filled if contacts are frozen.
     extents: Vec<f32>,
     poses: Vec<PoseRow>,

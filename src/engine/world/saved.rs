@@ -13,6 +13,7 @@ use crate::bodies::{BodyDef, BodyKind};
 use crate::constraints::records::kept::Kept;
 use crate::contacts::Contact;
 use crate::lanes::LaneWidth;
+use crate::narrowphase::frozen::FrozenContacts;
 use crate::shapes::{MassProperties, Shape};
 use crate::solvers::{self, Variant};
 use glam::Vec2;
@@ -69,6 +70,8 @@ struct SavedWorld {
     contacts: Vec<Contact>,
     impulses_of: Option<f32>,
     kept: Kept,
+    #[serde(default)]
+    frozen: FrozenContacts,
     applied: Vec<StandingForces>,
     events: Events,
     traits: Traits,
@@ -99,6 +102,7 @@ impl Serialize for World {
             contacts: self.contacts.clone(),
             impulses_of: self.impulses_of,
             kept: self.work.kept.clone(),
+            frozen: self.narrow.frozen.clone(),
             applied: self.applied.clone(),
             events: self.events.clone(),
             traits: self.traits,
@@ -195,6 +199,7 @@ impl SavedWorld {
         (world.step_index, world.traits) = (self.step_index, self.traits);
         world.features = world.traits.features();
         (world.applied, world.events, world.impulses_of) = (self.applied, self.events, self.impulses_of);
+        world.narrow.frozen = self.frozen;
         if self.kept.size() == world.solver_is.kept {
             world.work.kept = self.kept;
         }

@@ -17,8 +17,8 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 pub use scale::Scale;
 pub use style::Style;
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn = Result<(), Box<dyn std::error::Error>>;
+type Surface<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Drawing = Result<(), Box<dyn std::error::Error>>;
 type Pixel = (i32, i32);
 
 const PAPER: RGBColor = RGBColor(255, 255, 255);
@@ -70,7 +70,7 @@ pub struct Axis {
 
 /// Where what fails is drawn: beside the end at which errors are largest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Strip {
+pub enum FailStrip {
     /// Nothing fails.
     None,
     /// Errors grow to the right.
@@ -81,7 +81,7 @@ pub enum Strip {
 
 /// How the marks of a series are connected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Line {
+pub enum LineStyle {
     /// Not at all.
     None,
     /// By straight lines, interrupted where a mark fails.
@@ -101,11 +101,11 @@ pub struct Chart {
     pub x: Axis,
     /// Vertical axis.
     pub y: Axis,
-    /// Strip of what fails.
-    pub strip: Strip,
+    /// FailStrip of what fails.
+    pub strip: FailStrip,
     /// Tolerances: the part of the frame up to this x and y is shaded.
     pub good: [Option<f64>; 2],
-    /// Drawn one after the other.
+    /// Drawing one after the other.
     pub series: Vec<Series>,
 }
 
@@ -115,7 +115,7 @@ pub struct Series {
     /// Color and marker.
     pub style: Style,
     /// Connection of the marks.
-    pub line: Line,
+    pub line: LineStyle,
     /// Width of the line (pixels).
     pub width: u32,
     /// Whether the line is dashed.
@@ -125,24 +125,24 @@ pub struct Series {
     /// Pixels by which the series is moved down, so that series that coincide are visible.
     pub shift: i32,
     /// The marks, in the order in which they are connected.
-    pub marks: Vec<Mark>,
+    pub marks: Vec<ChartMark>,
 }
 
 impl Series {
     /// Connected marks.
-    pub fn line(style: Style, marks: Vec<Mark>) -> Series {
-        Series { style, line: Line::Straight, width: 2, dashed: false, opacity: 0.8, shift: 0, marks }
+    pub fn line(style: Style, marks: Vec<ChartMark>) -> Series {
+        Series { style, line: LineStyle::Straight, width: 2, dashed: false, opacity: 0.8, shift: 0, marks }
     }
 
     /// Marks without a line.
-    pub fn marks(style: Style, marks: Vec<Mark>) -> Series {
-        Series { line: Line::None, opacity: 1.0, ..Series::line(style, marks) }
+    pub fn marks(style: Style, marks: Vec<ChartMark>) -> Series {
+        Series { line: LineStyle::None, opacity: 1.0, ..Series::line(style, marks) }
     }
 }
 
 /// A mark.
 #[derive(Clone, Debug, Default)]
-pub struct Mark {
+pub struct ChartMark {
     /// Value on the horizontal axis.
     pub x: f64,
     /// Value on the vertical axis.
@@ -161,15 +161,15 @@ pub struct Mark {
     pub title: String,
 }
 
-impl Mark {
+impl ChartMark {
     /// A mark with a title.
-    pub fn at(x: f64, y: f64, size: f64, title: String) -> Mark {
-        Mark { x, y, size, title, ..Mark::default() }
+    pub fn at(x: f64, y: f64, size: f64, title: String) -> ChartMark {
+        ChartMark { x, y, size, title, ..ChartMark::default() }
     }
 }
 
 /// The frame of a chart (pixels).
-struct Frame<'a> {
+struct PlotFrame<'a> {
     chart: &'a Chart,
     left: i32,
     right: i32,
@@ -198,15 +198,15 @@ impl Chart {
         )
     }
 
-    fn draw(&self, text: &mut String, titles: &mut String) -> Drawn {
+    fn draw(&self, text: &mut String, titles: &mut String) -> Drawing {
         let [width, height] = self.size;
         let head = if self.title.is_empty() { 12 } else { 30 };
-        let strip = |side: Strip| if self.strip == side { STRIP } else { 0 };
-        let frame = Frame {
+        let strip = |side: FailStrip| if self.strip == side { STRIP } else { 0 };
+        let frame = PlotFrame {
             chart: self,
             left: LEFT,
-            right: width - RIGHT - strip(Strip::Right),
-            top: head + strip(Strip::Top),
+            right: width - RIGHT - strip(FailStrip::Right),
+            top: head + strip(FailStrip::Top),
             bottom: height - BOTTOM,
         };
         let area = SVGBackend::with_string(text, (width as u32, height as u32)).into_drawing_area();
@@ -232,8 +232,8 @@ impl Chart {
             for mark in series.marks.iter().filter(|mark| !mark.label.is_empty()) {
                 let at = frame.place(series, mark);
                 if let Some((place, linked)) = labels.place(at, mark.size as i32, &mark.label, &frame) {
-                    if linked {
-                        area.draw(&PathElement::new(vec![at, place], FRAME))?;
+                    if let Some(end) = linked {
+                        area.draw(&PathElement::new(vec![at, end], FRAME))?;
                     }
                     write(&area, &mark.label, place, TICK, HPos::Left)?;
                 }
@@ -244,7 +244,7 @@ impl Chart {
     }
 }
 
-impl Frame<'_> {
+impl PlotFrame<'_> {
     fn across(&self, x: f64) -> i32 {
         self.left + (self.chart.x.scale.share(x) * f64::from(self.right - self.left)).round() as i32
     }
@@ -254,32 +254,32 @@ impl Frame<'_> {
     }
 
     /// The place of a mark (pixels).
-    fn place(&self, series: &Series, mark: &Mark) -> Pixel {
+    fn place(&self, series: &Series, mark: &ChartMark) -> Pixel {
         // What fails is spread over the strip by solver.
         let spread = 7 + (series.style.marker as i32) * (STRIP - 14) / 7;
         let (x, y) = (self.across(mark.x), self.up(mark.y) + series.shift);
         match (mark.fails, self.chart.strip) {
-            (true, Strip::Right) => (self.right + spread, y),
-            (true, Strip::Top) => (x, self.top - spread),
+            (true, FailStrip::Right) => (self.right + spread, y),
+            (true, FailStrip::Top) => (x, self.top - spread),
             _ => (x, y),
         }
     }
 
     /// Paper, shades, and the strip.
-    fn ground(&self, area: &Area) -> Drawn {
-        let Frame { left, right, top, bottom, .. } = *self;
+    fn ground(&self, area: &Surface) -> Drawing {
+        let PlotFrame { left, right, top, bottom, .. } = *self;
         let [x, y] = self.chart.good;
         if x.is_some() || y.is_some() {
             let (x, y) = (x.map_or(right, |x| self.across(x)), y.map_or(top, |y| self.up(y)));
             area.draw(&Rectangle::new([(left, y), (x, bottom)], GOOD.filled()))?;
         }
         match self.chart.strip {
-            Strip::None => {}
-            Strip::Right => {
+            FailStrip::None => {}
+            FailStrip::Right => {
                 area.draw(&Rectangle::new([(right + 2, top), (right + STRIP, bottom)], FAILS.filled()))?;
                 write(area, "fails", (right + STRIP / 2 + 2, bottom + 11), TICK, HPos::Center)?;
             }
-            Strip::Top => {
+            FailStrip::Top => {
                 area.draw(&Rectangle::new([(left, top - STRIP), (right, top - 2)], FAILS.filled()))?;
                 write(area, "fails", (left - 6, top - STRIP / 2), TICK, HPos::Right)?;
             }
@@ -288,8 +288,8 @@ impl Frame<'_> {
     }
 
     /// Grid, ticks, their labels, and the names of the axes.
-    fn axes(&self, area: &Area) -> Drawn {
-        let Frame { left, right, top, bottom, chart } = *self;
+    fn axes(&self, area: &Surface) -> Drawing {
+        let PlotFrame { left, right, top, bottom, chart } = *self;
         let (x, y) = (&chart.x, &chart.y);
         for (value, label) in &y.scale.ticks {
             let at = self.up(*value);
@@ -302,7 +302,7 @@ impl Frame<'_> {
         for (value, label) in &x.scale.ticks {
             let at = self.across(*value);
             area.draw(&PathElement::new(vec![(at, top), (at, bottom)], GRID))?;
-            let end = if chart.strip == Strip::Right { right - 2 } else { right + RIGHT };
+            let end = if chart.strip == FailStrip::Right { right - 2 } else { right + RIGHT };
             if at - half(label) >= free && at + half(label) <= end {
                 write(area, label, (at, bottom + 11), TICK, HPos::Center)?;
                 free = at + half(label);
@@ -332,21 +332,21 @@ impl Frame<'_> {
         Ok(())
     }
 
-    fn series(&self, area: &Area, series: &Series) -> Drawn {
+    fn series(&self, area: &Surface, series: &Series) -> Drawing {
         let crate::lab::picture::Color(r, g, b, _) = series.style.rgb();
         let (solid, faint) = (RGBColor(r, g, b), RGBColor(r, g, b).mix(series.opacity));
         for part in series.marks.chunk_by(|a, b| !a.fails && !b.fails).filter(|part| !part[0].fails) {
             let mut path: Vec<Pixel> = Vec::new();
             for mark in part {
                 let at = self.place(series, mark);
-                if let (Line::Steps, Some(&(_, y))) = (series.line, path.last()) {
+                if let (LineStyle::Steps, Some(&(_, y))) = (series.line, path.last()) {
                     path.push((at.0, y));
                 }
                 path.push(at);
             }
             let stroke = faint.stroke_width(series.width);
             match (series.line, path.len() > 1, series.dashed) {
-                (Line::None, ..) | (_, false, _) => {}
+                (LineStyle::None, ..) | (_, false, _) => {}
                 (_, _, true) => area.draw(&DashedPathElement::new(path, 3, 3, stroke))?,
                 (_, _, false) => area.draw(&PathElement::new(path, stroke))?,
             }
@@ -374,7 +374,7 @@ impl Frame<'_> {
 }
 
 /// Text in ink, anchored at its left, middle or right.
-fn write(area: &Area, text: &str, at: Pixel, size: i32, anchor: HPos) -> Drawn {
+fn write(area: &Surface, text: &str, at: Pixel, size: i32, anchor: HPos) -> Drawing {
     let style = ("sans-serif", size).into_font().color(&INK).pos(Pos::new(anchor, VPos::Center));
     area.draw(&Text::new(text.to_string(), at, style))?;
     Ok(())
@@ -391,11 +391,19 @@ struct Labels {
 }
 
 impl Labels {
-    /// The left end of a label next to a mark of radius `r`, and whether it is so far away that a line should lead to
-    /// it. `None` if there is no free place.
-    fn place(&mut self, (x, y): Pixel, r: i32, label: &str, frame: &Frame) -> Option<(Pixel, bool)> {
+    /// The left end of a label next to a mark of radius `r`, and, if it is far away, the end at which a line should
+    /// lead to it. `None` if there is no free place.
+    fn place(
+        &mut self,
+        (x, y): Pixel,
+        r: i32,
+        label: &str,
+        frame: &PlotFrame,
+    ) -> Option<(Pixel, Option<Pixel>)> {
         let (width, half) = (6 * label.chars().count() as i32, LABEL / 2);
-        for away in [r + 3, 40, 80, 130] {
+        // Only a large chart has room for labels far away.
+        let most = if frame.chart.size[0] > 600 { 4 } else { 1 };
+        for away in [r + 3, 40, 80, 130].into_iter().take(most) {
             let (near, far, slant) = (x + away, x - away - width, away * 2 / 3);
             let places = [
                 (near, y - slant),
@@ -414,7 +422,8 @@ impl Labels {
             };
             if let Some(place) = places.into_iter().find(free) {
                 self.taken.push([place.0, place.1 - half, place.0 + width, place.1 + half]);
-                return Some((place, away >= 40));
+                let end = if place.0 < x { (place.0 + width).min(x) } else { place.0 - 2 };
+                return Some((place, (away >= 40).then_some((end, place.1))));
             }
         }
         None
@@ -490,8 +499,8 @@ pub fn file(title: &str, names: &[(&str, Style)], rows: &[(String, Vec<Chart>)])
 mod tests {
     use super::*;
 
-    fn chart(strip: Strip) -> Chart {
-        let mark = |x, y, fails| Mark { fails, ..Mark::at(x, y, 4.0, format!("<{x}>")) };
+    fn chart(strip: FailStrip) -> Chart {
+        let mark = |x, y, fails| ChartMark { fails, ..ChartMark::at(x, y, 4.0, format!("<{x}>")) };
         let marks = vec![
             mark(1.0, 1e-3, false),
             mark(2.0, 1e-4, false),
@@ -513,18 +522,20 @@ mod tests {
 
     #[test]
     fn a_line_breaks_where_a_mark_fails_and_every_mark_has_its_title() {
-        let whole = chart(Strip::Top).svg();
+        let whole = chart(FailStrip::Top).svg();
         let lines = |svg: &str| svg.matches("<polyline fill=\"none\" opacity=\"0.8\"").count();
         assert_eq!((lines(&whole), whole.matches("<title>&lt;").count()), (1, 4), "{whole}");
         assert!(whole.contains("a &amp; b") && whole.contains("fails") && whole.contains("var(--good)"));
         assert!(!whole.contains("NaN") && whole.matches("<svg").count() == whole.matches("</svg>").count());
-        assert!(!chart(Strip::None).svg().contains(">\nfails\n"));
+        assert!(!chart(FailStrip::None).svg().contains(">\nfails\n"));
     }
 
     #[test]
     fn a_file_holds_all_charts_and_follows_the_page() {
-        let rows =
-            [("one".to_string(), vec![chart(Strip::Right), chart(Strip::None)]), ("two".to_string(), vec![])];
+        let rows = [
+            ("one".to_string(), vec![chart(FailStrip::Right), chart(FailStrip::None)]),
+            ("two".to_string(), vec![]),
+        ];
         let file = file("title", &[("pgs", Style::at(0))], &rows);
         assert_eq!((file.matches("<svg ").count(), file.matches("</svg>").count()), (3, 3));
         assert!(file.contains("prefers-color-scheme: dark") && file.contains("width=\"840\""));

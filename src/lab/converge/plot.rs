@@ -1,121 +1,139 @@
-//! `converge.svg`: residual against sweeps, for each law and start.
+//! `converge.svg`: residual against sweeps and, beside it, against time, for each law and start.
 //!
-//! Both axes are logarithmic. One color per solver, one line style per order. A dot shows where a curve first
-//! reaches a tolerance. Thin curves are the methods in `f64`.
+//! Both axes are logarithmic. One color per solver, paler for a part of its schedule; solid lines are in natural order,
+//! dashed ones in others. A marker shows where a curve first reaches a tolerance: filled in natural order, hollow in
+//! colored order. Thin curves are the `f64` methods, which have no time.
 
 use super::replay::{Sequence, Start};
 use super::warm::WarmStartSource;
-use super::{ConvergeReport, CurvePoint, LAWS, ReplayCurve};
-use crate::lab::error::Error;
-use crate::lab::picture;
-use crate::lab::picture::axes::{Area, Drawn, Edges, INK, LogScale, write};
-use crate::lab::units::is_emulated;
-use plotters::element::DashedPathElement;
-use plotters::prelude::*;
-use plotters::style::text_anchor::HPos;
+use super::{ConvergeReport, CurvePoint, Reached, ReplayCurve, TOLERANCES};
+use crate::lab::chart::{self, Axis, Chart, ChartMark, FailStrip, Scale, Series, Style};
 
-const PANEL: (i32, i32) = (560, 330);
-const LEGEND_LINE: i32 = 20;
-const HEADING: i32 = 30;
 /// Residuals that are shown. Values outside are drawn at the edge.
-const RESIDUALS: [f64; 2] = [1e-8, 10.0];
+const SHOWN: [f64; 2] = [1e-8, 10.0];
 
-/// Maps the name of a solver to its color.
-pub type Colors<'a> = &'a dyn Fn(&str) -> picture::Color;
+/// Maps the name of a solver to its style.
+pub type Styles<'a> = &'a dyn Fn(&str) -> Style;
+
+/// A row of charts: a law and a start.
+struct LawRow {
+    title: String,
+    start: Start,
+    residual: fn(&CurvePoint) -> Option<f64>,
+    reached: fn(&ReplayCurve) -> &Reached,
+}
 
 /// The picture as SVG text.
-pub fn svg(report: &ConvergeReport, colors: Colors) -> Result<String, Error> {
-    let mut text = String::new();
-    draw(report, colors, &mut text).map_err(|e| Error::invalid("converge.svg", e.to_string()))?;
-    Ok(text)
-}
-
-fn draw(report: &ConvergeReport, colors: Colors, text: &mut String) -> Drawn {
-    let mut solvers: Vec<&ReplayCurve> = Vec::new();
+pub fn svg(report: &ConvergeReport, styles: Styles) -> String {
+    let mut solvers: Vec<&str> = Vec::new();
     for curve in &report.curves {
-        if solvers.iter().all(|s| s.solver != curve.solver) {
-            solvers.push(curve);
+        if !solvers.contains(&curve.solver.as_str()) {
+            solvers.push(&curve.solver);
         }
     }
-    let starts = if report.warm_start == WarmStartSource::None { 1 } else { 2 };
-    let lines = solvers.len() + 3;
-    let top = HEADING + LEGEND_LINE * (lines.div_ceil(2) as i32 + 1);
-    // Panels are stacked vertically, so that they are large enough on a narrow screen.
-    let height = top + 2 * starts * PANEL.1;
-    let root = SVGBackend::with_string(text, (PANEL.0 as u32, height as u32)).into_drawing_area();
-    root.fill(&WHITE)?;
-    write(&root, &format!("{}: residual against work", report.problem), (8, 18), 18, HPos::Left)?;
-    let emulated = if is_emulated(report.lanes) { ", emulated" } else { "" };
-    let orders = [
-        (Sequence::Natural, "natural order".to_string()),
-        (Sequence::Colored, format!("colored, {} lanes{emulated}", report.lanes)),
-        (Sequence::Shuffled(0), "shuffled".to_string()),
-    ];
-    let of_solver = |c: &&ReplayCurve| (Sequence::Natural, name(c), style(c, colors));
-    let of_order = orders.into_iter().map(|(order, name)| (order, name, INK.stroke_width(2)));
-    for (i, (order, name, style)) in solvers.iter().map(of_solver).chain(of_order).enumerate() {
-        let at = (12 + 275 * (i % 2) as i32, HEADING + 10 + LEGEND_LINE * (i / 2) as i32);
-        line(&root, vec![at, (at.0 + 40, at.1)], order, style)?;
-        write(&root, &name, (at.0 + 48, at.1), 14, HPos::Left)?;
-    }
-    for (i, start) in [Start::Cold, Start::Warm].into_iter().take(starts as usize).enumerate() {
-        for (law, name) in ["Rigid law", "Solver's own law"].into_iter().enumerate() {
-            let y = top + (2 * i + law) as i32 * PANEL.1;
-            write(&root, &format!("{name}, {start} start"), (8, y + 10), 16, HPos::Left)?;
-            panel(&root, y + HEADING, report, colors, start, law)?;
-        }
-    }
-    root.present()?;
-    Ok(())
+    let timed = report.curves.iter().any(|c| c.iteration.is_some());
+    let row = |law: &LawRow| {
+        let notes = coinciding(report, law);
+        let by_sweeps = chart(report, law, styles, false);
+        let by_time = timed.then(|| chart(report, law, styles, true));
+        (format!("{}{notes}", law.title), by_sweeps.into_iter().chain(by_time.flatten()).collect())
+    };
+    let rows: Vec<(String, Vec<Chart>)> = laws(report).iter().map(row).collect();
+    let names: Vec<(&str, Style)> = solvers.into_iter().map(|s| (s, styles(name(s)))).collect();
+    let title = format!(
+        "{}: residual against work; solid: natural order, dashed: colored or shuffled",
+        report.problem
+    );
+    chart::file(&title, &names, &rows)
 }
 
-fn name(curve: &ReplayCurve) -> String {
-    if curve.arithmetic == "f32" { curve.solver.clone() } else { format!("{} (f64)", curve.solver) }
-}
-
-/// The solver's color, paler for a part of the solver.
-fn style(curve: &ReplayCurve, colors: Colors) -> ShapeStyle {
-    let picture::Color(r, g, b, _) = colors(curve.solver.split(' ').next().unwrap_or(&curve.solver));
-    let width = if curve.arithmetic == "f32" { 2 } else { 1 };
-    RGBColor(r, g, b).mix(if curve.is_part { 0.4 } else { 1.0 }).stroke_width(width)
-}
-
-fn line(area: &Area, points: Vec<(i32, i32)>, order: Sequence, style: ShapeStyle) -> Drawn {
-    match order {
-        Sequence::Natural => area.draw(&PathElement::new(points, style))?,
-        Sequence::Colored => area.draw(&DashedPathElement::new(points, 9, 5, style))?,
-        Sequence::Shuffled(_) => area.draw(&DashedPathElement::new(points, 2, 4, style))?,
-    }
-    Ok(())
-}
-
-fn panel(area: &Area, top: i32, report: &ConvergeReport, colors: Colors, start: Start, law: usize) -> Drawn {
-    let edges = Edges { left: 64, right: PANEL.0 - 28, top, bottom: top + PANEL.1 - HEADING - 44 };
-    // If a solver's result does not depend on the start, its cold curve stands for both.
-    let remembers =
-        |c: &ReplayCurve| report.curves.iter().any(|o| o.solver == c.solver && o.start == Start::Warm);
-    let curves = || report.curves.iter().filter(|c| c.start == start || !remembers(c));
-    let sweeps = curves().flat_map(|c| c.points.iter().filter(|p| p.sweeps > 0).map(|p| p.sweeps as f64));
-    let (across, up) = (LogScale::of(sweeps, 6), LogScale::of(RESIDUALS.into_iter(), 10));
-    let label = |v: f64| if (0.01..1e4).contains(&v) { format!("{v}") } else { format!("{v:.0e}") };
-    edges.grid(area, [&across, &up], 12, [&label, &label])?;
-    area.draw(&Rectangle::new([(edges.left, top), (edges.right, edges.bottom)], INK))?;
-    write(area, "constraint sweeps", ((edges.left + edges.right) / 2, edges.bottom + 30), 13, HPos::Center)?;
-    for curve in curves() {
-        let at = |p: &CurvePoint| {
-            let residual = LAWS[law](p).filter(|r| r.is_finite() && p.sweeps > 0)?;
-            let y = up.pixel(residual.clamp(RESIDUALS[0], RESIDUALS[1]), edges.bottom, top);
-            Some((across.pixel(p.sweeps as f64, edges.left, edges.right), y))
+fn laws(report: &ConvergeReport) -> Vec<LawRow> {
+    let starts = [Start::Cold, Start::Warm].into_iter();
+    let known = starts.filter(|s| *s == Start::Cold || report.warm_start != WarmStartSource::None);
+    let both = |start: Start| {
+        let rigid = LawRow {
+            title: format!("Rigid law, {start} start"),
+            start,
+            residual: |p| Some(p.rigid),
+            reached: |c| &c.rigid,
         };
-        let style = style(curve, colors);
-        let path: Vec<(i32, i32)> = curve.points.iter().filter_map(at).collect();
-        if path.len() > 1 {
-            line(area, path, curve.order, style)?;
-        }
-        let first = [&curve.rigid, &curve.own][law].first.into_iter().flatten();
-        for at in first.filter(|_| curve.arithmetic == "f32").filter_map(|i| at(&curve.points[i])) {
-            area.draw(&Circle::new(at, 4, style.filled()))?;
+        let title = format!("Solver's own law, {start} start");
+        [rigid, LawRow { title, start, residual: |p| p.own, reached: |c| &c.own }]
+    };
+    known.flat_map(both).collect()
+}
+
+/// The solver of a curve, which may be of a part of its schedule: `shim without relaxing`.
+fn name(curve: &str) -> &str {
+    curve.split(' ').next().unwrap_or(curve)
+}
+
+/// A note on solvers whose curves coincide under a law, `a = b`; empty if there are none.
+fn coinciding(report: &ConvergeReport, law: &LawRow) -> String {
+    let curves = report.curves.iter().filter(|c| c.start == law.start);
+    let values = |c: &ReplayCurve| c.points.iter().map(|p| (p.sweeps, (law.residual)(p))).collect::<Vec<_>>();
+    let mut groups: Vec<(&ReplayCurve, Vec<&str>)> = Vec::new();
+    for curve in curves.filter(|c| c.points.iter().any(|p| (law.residual)(p).is_some())) {
+        let same = |first: &ReplayCurve| first.order == curve.order && values(first) == values(curve);
+        match groups.iter_mut().find(|(first, _)| same(first)) {
+            Some((_, names)) => names.push(&curve.solver),
+            None => groups.push((curve, vec![&curve.solver])),
         }
     }
-    Ok(())
+    let mut found: Vec<String> =
+        groups.into_iter().filter(|(_, names)| names.len() > 1).map(|(_, names)| names.join(" = ")).collect();
+    found.sort();
+    found.dedup();
+    if found.is_empty() { String::new() } else { format!(" (curves that coincide: {})", found.join("; ")) }
+}
+
+/// The chart of a law against sweeps, or against time; `None` if nothing was measured.
+fn chart(report: &ConvergeReport, law: &LawRow, styles: Styles, by_time: bool) -> Option<Chart> {
+    // If a solver's result does not depend on the start, its cold curve stands for both.
+    let remembers = |c: &ReplayCurve| {
+        let same = |o: &&ReplayCurve| o.solver == c.solver && o.order == c.order && o.start == Start::Warm;
+        report.curves.iter().any(|o| same(&o))
+    };
+    let across = |c: &ReplayCurve, p: &CurvePoint| match by_time {
+        true => c.iteration.as_ref().map(|time| 1e-9 * time.median_ns * f64::from(p.iterations)),
+        false => Some(p.sweeps as f64),
+    };
+    let curves = report.curves.iter().filter(|c| c.start == law.start || !remembers(c));
+    let series: Vec<Series> = curves
+        .map(|curve| {
+            let first = (law.reached)(curve).first;
+            let mark = |(i, point): (usize, &CurvePoint)| {
+                let x = across(curve, point).filter(|x| *x > 0.0)?;
+                let y = (law.residual)(point).filter(|r| r.is_finite())?;
+                let reached = first.iter().position(|place| *place == Some(i));
+                let size = if reached.is_some() && curve.arithmetic == "f32" { 4.0 } else { 0.0 };
+                let title = reached.map_or(String::new(), |k| {
+                    let (solver, order) = (&curve.solver, &curve.order);
+                    format!("{solver}, {order}: {:.0e} after {} iterations", TOLERANCES[k], point.iterations)
+                });
+                Some(ChartMark {
+                    hollow: curve.order == Sequence::Colored,
+                    ..ChartMark::at(x, y, size, title)
+                })
+            };
+            let marks = curve.points.iter().enumerate().filter_map(mark).collect();
+            let (dashed, single) = (curve.order != Sequence::Natural, curve.arithmetic == "f32");
+            let opacity = if curve.is_part { 0.4 } else { 0.9 };
+            let width = if single { 2 } else { 1 };
+            Series { dashed, width, opacity, ..Series::line(styles(name(&curve.solver)), marks) }
+        })
+        .collect();
+    let xs: Vec<f64> = series.iter().flat_map(|s| &s.marks).map(|m| m.x).collect();
+    let mut y = Scale::log(SHOWN, "");
+    [y.low, y.high] = SHOWN;
+    let (name, unit) = if by_time { ("time, set-up excluded", "s") } else { ("constraint sweeps", "") };
+    (!xs.is_empty()).then(|| Chart {
+        size: [520, 320],
+        title: String::new(),
+        x: Axis { name: name.into(), scale: Scale::log(xs, unit) },
+        y: Axis { name: "residual".into(), scale: y },
+        strip: FailStrip::None,
+        good: [None; 2],
+        series,
+    })
 }

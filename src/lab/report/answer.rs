@@ -1,7 +1,7 @@
 //! The answer of a study on one page: which solver to use and when, the drawbacks, the best setting on each
 //! scene, which solvers fail, and what was left out.
 
-use super::doc::{self, Block, Cell, DocTable, Tone};
+use super::doc::{self, DocBlock, DocCell, DocTable, Tone};
 use super::environment::Environment;
 use super::units::{digits, is_emulated, si};
 use crate::engine::solvers::DEFAULT;
@@ -37,21 +37,21 @@ pub fn text(records: &[Record], environment: &Environment, steps: Option<u32>) -
 }
 
 /// The answer of a study.
-pub fn blocks(records: &[Record], environment: &Environment, steps: Option<u32>) -> Vec<Block> {
+pub fn blocks(records: &[Record], environment: &Environment, steps: Option<u32>) -> Vec<DocBlock> {
     let scenes: Vec<Answer> = records.chunk_by(|a, b| a.scene == b.scene).filter_map(Answer::of).collect();
     let ranking = ranking(records);
     let (cheapest, without) = cheapest(&scenes, records);
-    let plain = |text: String| Block::Text(Tone::Plain, text);
+    let plain = |text: String| DocBlock::Text(Tone::Plain, text);
     vec![
-        Block::Text(Tone::Lead, recommendation(&ranking, scenes.len(), steps)),
-        Block::Text(Tone::Bad, warnings(records, steps)),
+        DocBlock::Text(Tone::Lead, recommendation(&ranking, scenes.len(), steps)),
+        DocBlock::Text(Tone::Bad, warnings(records, steps)),
         plain(head(records, environment, scenes.len())),
-        Block::Table(cheapest),
+        DocBlock::Table(cheapest),
         plain(without),
-        Block::Text(Tone::Bad, fallen(records)),
-        Block::Table(accuracies(&scenes, records)),
-        Block::Table(standings(&ranking, scenes.len())),
-        Block::Text(Tone::Soft, LEGEND.to_string()),
+        DocBlock::Text(Tone::Bad, fallen(records)),
+        DocBlock::Table(accuracies(&scenes, records)),
+        DocBlock::Table(standings(&ranking, scenes.len())),
+        DocBlock::Text(Tone::Soft, LEGEND.to_string()),
     ]
 }
 
@@ -99,7 +99,7 @@ fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> Strin
     if ranking.leader().is_none() && ranking.first.len() > 1 {
         text += &format!(
             "  By speed there is no clear leader: with a scene left out or other tolerances, first is one of {}.",
-            short_list(&ranking.first, 8)
+            short_list(&ranking.first, 6)
         );
     }
     if let Some(place) = standings.iter().position(|s| s.solver == DEFAULT) {
@@ -212,9 +212,9 @@ fn cheapest(scenes: &[Answer], records: &[Record]) -> (DocTable, String) {
         match (answer.best(), answer.nearest) {
             (Some(best), _) => {
                 let [solver, others @ ..] = setting(best);
-                let mut cells = vec![Cell::scene(answer.scene), Cell::solver(&solver)];
-                cells.extend(others.map(Cell::from));
-                cells.extend(runner_up(answer, best).map(Cell::from));
+                let mut cells = vec![DocCell::scene(answer.scene), DocCell::solver(&solver)];
+                cells.extend(others.map(DocCell::from));
+                cells.extend(runner_up(answer, best).map(DocCell::from));
                 rows.row(cells);
             }
             (None, Some(nearest)) => {
@@ -345,10 +345,10 @@ fn later_line(r: &Record, why: &str) -> String {
 /// Notes on settings that are good enough in the run but fail later.
 fn fallen(records: &[Record]) -> String {
     let found = fails_later(records);
-    let lines = found.iter().take(MOST_NOTES).map(|(r, why)| format!("  ! {}\n", later_line(r, why)));
+    let lines = found.iter().take(MOST_NOTES).map(|(r, why)| format!("! {}\n", later_line(r, why)));
     let mut text: String = lines.collect();
     if found.len() > MOST_NOTES {
-        text += &format!("  ! and {} more in tables.txt\n", found.len() - MOST_NOTES);
+        text += &format!("! and {} more in tables.txt\n", found.len() - MOST_NOTES);
     }
     text
 }
@@ -394,11 +394,11 @@ averaged over scenes (0 where it is not good enough); range: with any scene left
     let mut rows = DocTable { most: MOST_RANKED, ..DocTable::new(CAPTION, 1, &head) };
     for own in &ranking.standings {
         let [low, high] = own.range;
-        let mut cells = vec![Cell::solver(own.solver)];
-        cells.extend([format!("{:.2}", own.score), format!("{low:.2}–{high:.2}")].map(Cell::from));
+        let mut cells = vec![DocCell::solver(own.solver)];
+        cells.extend([format!("{:.2}", own.score), format!("{low:.2}–{high:.2}")].map(DocCell::from));
         cells.extend(own.good.into_iter().chain([own.fastest]).map(|n| format!("{n} of {scenes}").into()));
         let fails = if own.fails_on.is_empty() { "–".into() } else { short_list(&own.fails_on, 2) };
-        cells.push(Cell { title: own.fails_on.join(", "), ..fails.into() });
+        cells.push(DocCell { title: own.fails_on.join(", "), ..fails.into() });
         rows.row(cells);
     }
     rows

@@ -1,6 +1,6 @@
 //! The tables of one scene, of performance profiles and of the order of contacts.
 
-use super::doc::{Cell, DocTable, Tone};
+use super::doc::{DocCell, DocTable, Tone};
 use super::units::{bodies, digits, is_emulated, ratio, si};
 use crate::engine::world::Order;
 use crate::lab::metrics::Errors;
@@ -101,13 +101,13 @@ fn lanes(record: &Record) -> String {
     }
 }
 
-fn row(record: &Record) -> Vec<Cell> {
+fn row(record: &Record) -> Vec<DocCell> {
     const NOTHING: &str = "–";
-    let mut cells: Vec<Cell> =
-        vec![Cell::solver(record.solver), record.budget_text.as_str().into(), lanes(record).into()];
+    let mut cells: Vec<DocCell> =
+        vec![DocCell::solver(record.solver), record.budget_text.as_str().into(), lanes(record).into()];
     let Some(sample) = &record.sample else {
         cells.resize(21, NOTHING.into());
-        cells.push(Cell::from(verdict(record)).tone(Tone::Bad));
+        cells.push(DocCell::from(verdict(record)).tone(Tone::Bad));
         return cells;
     };
     let mut texts = vec![
@@ -138,7 +138,7 @@ fn row(record: &Record) -> Vec<Cell> {
         front(&record.front),
         verdict(record),
     ]);
-    cells.extend(texts.into_iter().map(Cell::from));
+    cells.extend(texts.into_iter().map(DocCell::from));
     if let Some(last) = cells.last_mut() {
         last.tone = match (record.excess() <= 1.0, record.holds()) {
             (true, _) => Tone::Good,
@@ -189,7 +189,7 @@ least one solver solves";
             let solved = format!("{} in tolerance", profile.axis.name());
             let scenes = format!("{} of {}", profile.solvable, profile.scenes);
             let shares = FACTORS.map(|factor| format!("{:.0} %", 100.0 * profile.share(i, factor)).into());
-            rows.row([solved.into(), scenes.into(), Cell::solver(solver)].into_iter().chain(shares));
+            rows.row([solved.into(), scenes.into(), DocCell::solver(solver)].into_iter().chain(shares));
         }
     }
     rows
@@ -214,7 +214,7 @@ pub fn order_tables(records: &[Record]) -> Vec<DocTable> {
         let mut rows = DocTable { wide: true, ..DocTable::new(caption, 1, &head) };
         for solver in solvers_of(scene) {
             let cells = orders.iter().map(|&order| in_order(scene, solver, order).into());
-            rows.row(std::iter::once(Cell::solver(solver)).chain(cells));
+            rows.row(std::iter::once(DocCell::solver(solver)).chain(cells));
         }
         tables.push(rows);
     }

@@ -4,7 +4,6 @@
 //! has no distance to it.
 
 use super::environment::Environment;
-use super::export::decimal;
 use crate::engine::clock::Phase;
 use crate::lab::error::Error;
 use crate::lab::metrics::METRICS;
@@ -52,10 +51,20 @@ fn listed(columns: &[[&'static str; 3]]) -> Vec<Column> {
 }
 
 /// The value of a cell of `study.csv`; null leaves it empty.
-type Cell = fn(&Record, &Environment) -> Value;
+type StudyCell = fn(&Record, &Environment) -> Value;
 
-const fn cell(name: &'static str, unit: &'static str, meaning: &'static str, of: Cell) -> (Column, Cell) {
+const fn cell(
+    name: &'static str,
+    unit: &'static str,
+    meaning: &'static str,
+    of: StudyCell,
+) -> (Column, StudyCell) {
     (Column { name, unit, meaning }, of)
+}
+
+/// The shortest decimal that gives the same `f32`: 0.3, not 0.30000001.
+pub(super) fn decimal(value: f32) -> Value {
+    value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
 }
 
 /// A figure of the times, or null without times.
@@ -64,7 +73,7 @@ fn sample<T: Into<Value>>(record: &Record, of: fn(&Sample) -> T) -> Value {
 }
 
 /// Columns of `study.csv` before those of [`METRICS`]: setting and times.
-const SETTING: &[(Column, Cell)] = &[
+const SETTING: &[(Column, StudyCell)] = &[
     cell("schema_version", "", "version of these columns", |_, _| SCHEMA.into()),
     cell("commit", "", "commit that the program was built from", |_, e| e.commit.as_str().into()),
     cell("cpu", "", "processor", |_, e| e.cpu.as_str().into()),
@@ -139,7 +148,7 @@ const SETTING: &[(Column, Cell)] = &[
 ];
 
 /// Columns of `study.csv` after those of [`METRICS`]: reference value, counts and verdict.
-const VERDICT: &[(Column, Cell)] = &[
+const VERDICT: &[(Column, StudyCell)] = &[
     cell("reference", "", "quantity of the reference value", |r, _| r.truth.map(|t| t.quantity).into()),
     cell("reference_unit", "", "unit of the next two columns", |r, _| r.truth.map(|t| t.unit).into()),
     cell("reference_value", "*", "reference value of the scene", |r, _| r.truth.map(|t| t.expected).into()),
@@ -222,7 +231,7 @@ const VERDICT: &[(Column, Cell)] = &[
 /// The columns of `study.csv`, in order.
 fn study_columns() -> Vec<Column> {
     let metrics = METRICS.iter().map(|m| column([m.name, m.unit, m.meaning]));
-    let others = |list: &'static [(Column, Cell)]| list.iter().map(|c| c.0);
+    let others = |list: &'static [(Column, StudyCell)]| list.iter().map(|c| c.0);
     let phases = column(["<phase>_ns", "ns", "time of a phase of a step, median"]);
     others(SETTING).chain(metrics).chain(others(VERDICT)).chain([phases]).collect()
 }
@@ -237,8 +246,9 @@ pub fn study_csv(records: &[Record], environment: &Environment) -> Result<Vec<u8
         writer.write_record(fixed.map(|c| c.name.to_string()).chain(phases)).map_err(failed)?;
     }
     for record in records {
-        let cells =
-            |list: &[(Column, Cell)]| list.iter().map(|(_, of)| of(record, environment)).collect::<Vec<_>>();
+        let cells = |list: &[(Column, StudyCell)]| {
+            list.iter().map(|(_, of)| of(record, environment)).collect::<Vec<_>>()
+        };
         let metrics = METRICS.iter().map(|m| record.errors.and_then(|e| e.get(m.name)).into());
         let phases = Phase::ALL.map(|p| record.sample.as_ref().map(|s| s.phase_ns[p as usize]).into());
         let line = cells(SETTING).into_iter().chain(metrics).chain(cells(VERDICT)).chain(phases);

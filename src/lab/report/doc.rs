@@ -36,7 +36,7 @@ impl Tone {
 
 /// A cell of a table.
 #[derive(Clone, Debug, Default)]
-pub struct Cell {
+pub struct DocCell {
     /// Its text.
     pub text: String,
     /// On a page: shown when the mouse is over it.
@@ -51,26 +51,26 @@ pub struct Cell {
     pub css: String,
 }
 
-impl<T: Into<String>> From<T> for Cell {
-    fn from(text: T) -> Cell {
-        Cell { text: text.into(), ..Cell::default() }
+impl<T: Into<String>> From<T> for DocCell {
+    fn from(text: T) -> DocCell {
+        DocCell { text: text.into(), ..DocCell::default() }
     }
 }
 
-impl Cell {
+impl DocCell {
     /// The name of a solver, with its marker.
-    pub fn solver(name: &str) -> Cell {
-        Cell { style: Some(Style::of(name)), ..name.into() }
+    pub fn solver(name: &str) -> DocCell {
+        DocCell { style: Some(Style::of(name)), ..name.into() }
     }
 
     /// The name of a scene, which leads to its charts.
-    pub fn scene(name: &str) -> Cell {
-        Cell { link: anchor(name), ..name.into() }
+    pub fn scene(name: &str) -> DocCell {
+        DocCell { link: anchor(name), ..name.into() }
     }
 
     /// The same cell in another tone.
-    pub fn tone(self, tone: Tone) -> Cell {
-        Cell { tone, ..self }
+    pub fn tone(self, tone: Tone) -> DocCell {
+        DocCell { tone, ..self }
     }
 
     fn html(&self, element: &str, left: bool) -> String {
@@ -113,7 +113,7 @@ pub struct DocTable {
     /// Names of the columns.
     pub head: Vec<String>,
     /// Cells.
-    pub rows: Vec<Vec<Cell>>,
+    pub rows: Vec<Vec<DocCell>>,
     /// Number of columns that are aligned at the left; others are at the right.
     pub left: usize,
     /// As text: whether it may be wider than a terminal page.
@@ -134,7 +134,7 @@ impl DocTable {
     }
 
     /// Adds a row.
-    pub fn row<C: Into<Cell>>(&mut self, cells: impl IntoIterator<Item = C>) {
+    pub fn row<C: Into<DocCell>>(&mut self, cells: impl IntoIterator<Item = C>) {
         self.rows.push(cells.into_iter().map(Into::into).collect());
     }
 
@@ -161,14 +161,14 @@ impl DocTable {
             text += &format!("<caption>{}</caption>", escaped(&self.caption));
         }
         let head = |(i, name): (usize, &String)| {
-            Cell::from(name.trim().replace('\n', " ")).html("th", i < self.left)
+            DocCell::from(name.trim().replace('\n', " ")).html("th", i < self.left)
         };
         text += &format!(
             "<thead><tr>{}</tr></thead><tbody>\n",
             self.head.iter().enumerate().map(head).collect::<String>()
         );
         for row in &self.rows {
-            let cell = |(i, c): (usize, &Cell)| c.html(if i == 0 { "th" } else { "td" }, i < self.left);
+            let cell = |(i, c): (usize, &DocCell)| c.html(if i == 0 { "th" } else { "td" }, i < self.left);
             text += &format!("<tr>{}</tr>\n", row.iter().enumerate().map(cell).collect::<String>());
         }
         text += "</tbody></table>\n";
@@ -181,7 +181,7 @@ impl DocTable {
 
 /// A part of a document.
 #[derive(Clone, Debug)]
-pub enum Block {
+pub enum DocBlock {
     /// Name of a part, with a remark; scenes are anchors.
     Heading(String, String),
     /// A paragraph. Line breaks stay.
@@ -195,16 +195,16 @@ pub enum Block {
 }
 
 /// The document as text, in lines of at most 120 characters except for wide tables.
-pub fn text(blocks: &[Block]) -> String {
-    let one = |block: &Block| match block {
-        Block::Heading(name, remark) if remark.is_empty() => format!("\n{name}\n"),
-        Block::Heading(name, remark) => format!("\n{name} · {remark}\n"),
-        Block::Text(_, text) if text.is_empty() => String::new(),
-        Block::Text(Tone::Lead, text) => lines(text) + "\n",
-        Block::Text(Tone::Soft, text) => format!("\n{}", lines(text)),
-        Block::Text(_, text) => lines(text),
-        Block::Table(table) => format!("\n{}", table.text()),
-        Block::Charts(..) | Block::Html(_) => String::new(),
+pub fn text(blocks: &[DocBlock]) -> String {
+    let one = |block: &DocBlock| match block {
+        DocBlock::Heading(name, remark) if remark.is_empty() => format!("\n{name}\n"),
+        DocBlock::Heading(name, remark) => format!("\n{name} · {remark}\n"),
+        DocBlock::Text(_, text) if text.is_empty() => String::new(),
+        DocBlock::Text(Tone::Lead, text) => lines(text) + "\n",
+        DocBlock::Text(Tone::Soft, text) => format!("\n{}", lines(text)),
+        DocBlock::Text(_, text) => lines(text),
+        DocBlock::Table(table) => format!("\n{}", table.text()),
+        DocBlock::Charts(..) | DocBlock::Html(_) => String::new(),
     };
     blocks.iter().map(one).collect()
 }
@@ -219,28 +219,31 @@ pub fn lines(text: &str) -> String {
 }
 
 /// The document as HTML.
-pub fn html(blocks: &[Block]) -> String {
-    let one = |block: &Block| match block {
-        Block::Heading(name, remark) => {
+pub fn html(blocks: &[DocBlock]) -> String {
+    let one = |block: &DocBlock| match block {
+        DocBlock::Heading(name, remark) => {
             let (id, name, remark) = (anchor(name), escaped(name), escaped(remark));
             format!("<h3 id=\"{id}\">{name} <span class=\"soft\">{remark}</span></h3>\n")
         }
-        Block::Text(_, text) if text.trim().is_empty() => String::new(),
-        Block::Text(tone, text) => {
+        DocBlock::Text(_, text) if text.trim().is_empty() => String::new(),
+        DocBlock::Text(tone, text) => {
             // Every second part stands between backquotes.
-            let safe = escaped(text.trim());
+            let lines: Vec<String> = text.trim().lines().map(escaped).collect();
+            let safe = lines.join("<br/>\n");
             let parts = safe.split('`').enumerate();
-            let marked = parts.map(|(i, part)| if i % 2 == 1 { format!("<code>{part}</code>") } else { part.into() });
-            let lines = marked.collect::<String>().replace('\n', "<br/>\n");
-            format!("<p class=\"{}\">{lines}</p>\n", tone.class())
+            let marked = parts.map(|(i, part)| match i % 2 {
+                0 => part.to_string(),
+                _ => format!("<code>{part}</code>"),
+            });
+            format!("<p class=\"{}\">{}</p>\n", tone.class(), marked.collect::<String>())
         }
-        Block::Table(table) if table.rows.is_empty() => String::new(),
-        Block::Table(table) => table.html(),
-        Block::Charts(class, charts) => {
+        DocBlock::Table(table) if table.rows.is_empty() => String::new(),
+        DocBlock::Table(table) => table.html(),
+        DocBlock::Charts(class, charts) => {
             let charts: String = charts.iter().map(Chart::svg).collect();
             format!("<div class=\"panels {class}\">\n{charts}</div>\n")
         }
-        Block::Html(html) => html.clone(),
+        DocBlock::Html(html) => html.clone(),
     };
     blocks.iter().map(one).collect()
 }
@@ -252,10 +255,10 @@ mod tests {
     #[test]
     fn a_document_reads_the_same_in_a_terminal_and_on_a_page() {
         let mut table = DocTable::new("caption", 1, &["solver", "time\nµs"]);
-        table.row([Cell::solver("pgs"), "12.3".into()]);
-        table.row([Cell::scene("a<b"), Cell::from("fell").tone(Tone::Bad)]);
+        table.row([DocCell::solver("pgs"), "12.3".into()]);
+        table.row([DocCell::scene("a<b"), DocCell::from("fell").tone(Tone::Bad)]);
         table.most = 1;
-        let blocks = [Block::Text(Tone::Bad, "x & y ".repeat(30)), Block::Table(table)];
+        let blocks = [DocBlock::Text(Tone::Bad, "x & y ".repeat(30)), DocBlock::Table(table)];
         let terminal = text(&blocks);
         assert!(terminal.lines().all(|line| line.chars().count() <= PAGE_WIDTH), "{terminal}");
         assert!(terminal.contains("pgs") && terminal.contains("and 1 more in report.html"), "{terminal}");

@@ -15,11 +15,6 @@ pub fn csv(records: &[Record], environment: &Environment) -> Result<Vec<u8>, Err
     columns::study_csv(records, environment)
 }
 
-/// The shortest decimal that gives the same `f32`: 0.3, not 0.30000001.
-pub(super) fn decimal(value: f32) -> Value {
-    value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
-}
-
 /// All settings of a study, chosen by the caller or constant.
 pub fn settings(plan: &StudyPlan) -> Value {
     #[derive(serde::Serialize)]
@@ -64,12 +59,12 @@ pub fn settings(plan: &StudyPlan) -> Value {
         "seed": plan.seed,
         "world": standard,
         "constants": {
-            "linear_slop_m": decimal(params::LINEAR_SLOP),
-            "speculative_distance_m": decimal(params::SPECULATIVE_DISTANCE),
-            "aabb_margin_m": decimal(params::AABB_MARGIN),
-            "restitution_threshold_m_s": decimal(params::RESTITUTION_THRESHOLD),
-            "max_position_correction_m": decimal(params::MAX_POSITION_CORRECTION),
-            "diverged_speed_m_s": decimal(params::DIVERGED_SPEED),
+            "linear_slop_m": columns::decimal(params::LINEAR_SLOP),
+            "speculative_distance_m": columns::decimal(params::SPECULATIVE_DISTANCE),
+            "aabb_margin_m": columns::decimal(params::AABB_MARGIN),
+            "restitution_threshold_m_s": columns::decimal(params::RESTITUTION_THRESHOLD),
+            "max_position_correction_m": columns::decimal(params::MAX_POSITION_CORRECTION),
+            "diverged_speed_m_s": columns::decimal(params::DIVERGED_SPEED),
         },
     })
 }

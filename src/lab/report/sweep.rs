@@ -1,7 +1,7 @@
 //! A sweep as text: the values at which each solver is good enough, and a table of times and errors.
 
 use super::by_scene::verdict;
-use super::doc::{Cell, DocTable};
+use super::doc::{DocCell, DocTable};
 use super::environment::Environment;
 use super::units::{bodies, count, digits, ratio, si};
 use crate::lab::study::Record;
@@ -143,7 +143,7 @@ fn alike(scene: &[Record], solver: &str) -> Vec<Vec<f64>> {
     groups.filter(|values| values.len() > 1).collect()
 }
 
-fn row(record: &Record) -> Vec<Cell> {
+fn row(record: &Record) -> Vec<DocCell> {
     let nothing = || "–".to_string();
     let time = |of: fn(&Sample) -> f64| record.sample.as_ref().map_or_else(nothing, |s| digits(of(s) / 1e3));
     let loaded = record.sample.as_ref().filter(|s| s.load.contacts > 0.0);
@@ -166,7 +166,7 @@ fn row(record: &Record) -> Vec<Cell> {
         reference.unwrap_or_else(nothing),
         verdict(record),
     ];
-    std::iter::once(Cell::solver(record.solver)).chain(texts.map(Cell::from)).collect()
+    std::iter::once(DocCell::solver(record.solver)).chain(texts.map(DocCell::from)).collect()
 }
 
 #[cfg(test)]

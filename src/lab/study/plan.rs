@@ -10,13 +10,13 @@ use crate::engine::params::Budget;
 use crate::engine::solvers::{DEFAULT, Variant, find};
 use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
+use crate::lab::files;
+use crate::lab::memory;
 use crate::lab::overrides::{self, Override};
 use crate::lab::scenes::holds::Demand;
 use crate::lab::scenes::tolerance::{GivenTolerances, Tolerance, Tolerances};
 use crate::lab::scenes::{self, Loaded, Scene};
 use crate::lab::units::si;
-use crate::lab::files;
-use crate::lab::memory;
 use std::sync::Arc;
 
 /// Everything that a study runs.

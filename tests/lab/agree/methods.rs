@@ -116,7 +116,7 @@ pub fn against(solver: &str) -> Option<Against> {
         "anderson" => Method(vectors::anderson),
         "apgd" => Method(vectors::apgd),
         "barzilai_borwein" => Solution(vectors::apgd),
-        "random_order" | "staggered" | "admm" | "direct" | "two_level" => Solution(solution),
+        "random_order" | "staggered" | "admm" | "direct" => Solution(solution),
         "sap" => Solution(vectors::sap),
         "shock" => Method(shock),
         "split_impulse" => Method(split_impulse),

@@ -2,7 +2,7 @@
 
 use crate::engine::constraints::Impacts;
 use crate::lab::chart::scale::number;
-use crate::lab::chart::{self, Axis, Chart, Line, Mark, Scale, Series, Strip, Style};
+use crate::lab::chart::{self, Axis, Chart, ChartMark, FailStrip, LineStyle, Scale, Series, Style};
 use crate::lab::report::by_scene;
 use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, solvers_of};
 use crate::lab::study::sweep::Swept;
@@ -101,13 +101,14 @@ fn precision_chart(
         ErrorAxis::Law => r.front.law,
         _ => r.front.truth,
     };
-    let mut front: Vec<Mark> = settings
+    let mut front: Vec<ChartMark> = settings
         .iter()
         .filter(|r| on_front(r))
-        .filter_map(|r| Some(Mark::at(drawn(r, error)?, time(r)?, 0.0, String::new())))
+        .filter_map(|r| Some(ChartMark::at(drawn(r, error)?, time(r)?, 0.0, String::new())))
         .collect();
     front.sort_by(|a, b| a.x.total_cmp(&b.x));
-    let front = Series { line: Line::Steps, width: 6, opacity: 0.3, ..Series::line(Style::neutral(), front) };
+    let front =
+        Series { line: LineStyle::Steps, width: 6, opacity: 0.3, ..Series::line(Style::neutral(), front) };
     let mut series = vec![front];
     for solver in solvers_of(scene) {
         let kinds =
@@ -125,17 +126,18 @@ fn precision_chart(
                         let [low, high] = quartiles.map(|t| si(t, "s"));
                         let title = format!("{what} (quartiles {low} to {high}), {}", shown(value, unit));
                         let label = if on_front(record) { short_words(record) } else { String::new() };
-                        Mark { bar: Some(quartiles), label, ..Mark::at(value, time, size, title) }
+                        ChartMark { bar: Some(quartiles), label, ..ChartMark::at(value, time, size, title) }
                     }
                     None => {
                         let title = format!("{what}, {}", by_scene::verdict(record));
-                        Mark { fails: true, ..Mark::at(0.0, time, 3.0, title) }
+                        ChartMark { fails: true, ..ChartMark::at(0.0, time, 3.0, title) }
                     }
                 };
-                Some(Mark { hollow: serial, ..mark })
+                Some(ChartMark { hollow: serial, ..mark })
             };
-            let marks: Vec<Mark> = own.enumerate().filter_map(mark).collect();
-            let (failed, held): (Vec<Mark>, Vec<Mark>) = marks.into_iter().partition(|mark| mark.fails);
+            let marks: Vec<ChartMark> = own.enumerate().filter_map(mark).collect();
+            let (failed, held): (Vec<ChartMark>, Vec<ChartMark>) =
+                marks.into_iter().partition(|mark| mark.fails);
             let style = Style::of(solver);
             series.push(Series { dashed: serial, ..Series::line(style, held) });
             series.push(Series::marks(style, failed));
@@ -146,7 +148,7 @@ fn precision_chart(
         title: String::new(),
         x: axis(name, x),
         y: axis("time of a step", y),
-        strip: Strip::Right,
+        strip: FailStrip::Right,
         good: [tolerance, None],
         series,
     }
@@ -180,10 +182,12 @@ pub fn overview(records: &[Record]) -> Option<Chart> {
         let small = own().map(|(r, slower, _)| {
             let title = format!("{solver} on {}: {}, {}× the fastest", r.scene, words(r), number(*slower));
             match wrong(r) {
-                Some(x) => Mark::at(x, *slower, 2.6, format!("{title}, error {} × tolerance", number(x))),
+                Some(x) => {
+                    ChartMark::at(x, *slower, 2.6, format!("{title}, error {} × tolerance", number(x)))
+                }
                 None => {
                     let title = format!("{title}: {}", by_scene::verdict(r));
-                    Mark { fails: true, ..Mark::at(0.0, *slower, 2.6, title) }
+                    ChartMark { fails: true, ..ChartMark::at(0.0, *slower, 2.6, title) }
                 }
             }
         });
@@ -191,7 +195,7 @@ pub fn overview(records: &[Record]) -> Option<Chart> {
     }
     for solver in solvers_of(records) {
         let own = || dots.iter().filter(|d| d.0.solver == solver);
-        let mut means: Vec<Mark> = Vec::new();
+        let mut means: Vec<ChartMark> = Vec::new();
         for budget in 0..=own().map(|d| d.2).max().unwrap_or(0) {
             let held: Vec<[f64; 2]> =
                 own().filter(|d| d.2 == budget).filter_map(|d| Some([wrong(d.0)?, d.1])).collect();
@@ -210,9 +214,9 @@ pub fn overview(records: &[Record]) -> Option<Chart> {
                 true => solver.to_string(),
                 false => format!("{solver}, fails on {} of {of}", of - holds),
             };
-            let mark = Mark::at(mean(0), mean(1), 5.5 + 1.2 * means.len().min(4) as f64, title);
+            let mark = ChartMark::at(mean(0), mean(1), 5.5 + 1.2 * means.len().min(4) as f64, title);
             means.iter_mut().for_each(|mark| mark.label.clear());
-            means.push(Mark { hollow: holds < of, label, ..mark });
+            means.push(ChartMark { hollow: holds < of, label, ..mark });
         }
         series.push(Series::line(Style::of(solver), means));
     }
@@ -223,7 +227,7 @@ pub fn overview(records: &[Record]) -> Option<Chart> {
         title: String::new(),
         x: axis("largest error ÷ scene tolerance (≤ 1 passes)", x),
         y: axis("time of a step, relative to the fastest setting that holds", y),
-        strip: Strip::Right,
+        strip: FailStrip::Right,
         good: [Some(1.0), None],
         series,
     })
@@ -242,20 +246,20 @@ pub fn profiles(records: &[Record]) -> Vec<Chart> {
             let mark = |factor: f64| {
                 let share = profile.share(i, factor);
                 let title = format!("{solver}: {:.0} % within {}×", 100.0 * share, number(factor));
-                Mark::at(factor, share, 3.0, title)
+                ChartMark::at(factor, share, 3.0, title)
             };
             let mut marks = vec![mark(1.0)];
             marks.extend(ratios.iter().filter(|&&r| r > 1.0).map(|&r| mark(r)));
-            marks.push(Mark { size: 0.0, ..mark(most * 1.2) });
+            marks.push(ChartMark { size: 0.0, ..mark(most * 1.2) });
             let shift = 2 * i as i32 - profile.ratios.len() as i32;
-            Series { line: Line::Steps, shift, ..Series::line(Style::of(solver), marks) }
+            Series { line: LineStyle::Steps, shift, ..Series::line(Style::of(solver), marks) }
         };
         Chart {
             size: [420, 310],
             title: format!("{} within tolerance", profile.axis.name()),
             x: axis("time relative to the fastest solver", x),
             y: axis(format!("share of {} scenes", profile.scenes), y),
-            strip: Strip::None,
+            strip: FailStrip::None,
             good: [None; 2],
             series: profile.ratios.iter().enumerate().map(series).collect(),
         }
@@ -288,7 +292,7 @@ pub fn over_lanes(records: &[Record]) -> Vec<Chart> {
                 let mark = |r: &Record| {
                     let value = of(r)?;
                     let title = format!("{solver}, {}: {}", words(r), number(value));
-                    Some(Mark::at(r.lanes as f64, value, 3.4, title))
+                    Some(ChartMark::at(r.lanes as f64, value, 3.4, title))
                 };
                 Series::line(Style::of(solver), runs(solver).into_iter().filter_map(mark).collect())
             };
@@ -297,7 +301,7 @@ pub fn over_lanes(records: &[Record]) -> Vec<Chart> {
                 title: scene[0].scene.clone(),
                 x: axis("lanes", Scale::steps(&widths)),
                 y: axis(name, scale),
-                strip: Strip::None,
+                strip: FailStrip::None,
                 good: [None; 2],
                 series: solvers_of(records).into_iter().map(series).collect(),
             });
@@ -317,7 +321,7 @@ pub fn iterations(records: &[Record]) -> Vec<Chart> {
                 let mark = |r: &Record| {
                     let (sweeps, value) = (r.sample.as_ref()?.load.sweeps.max(0.5), drawn(r, error)?);
                     let what = format!("{solver}, {}: {} sweeps", r.budget_text, number(sweeps));
-                    Some(Mark::at(sweeps, value, 3.6, format!("{what}, {}", shown(value, unit))))
+                    Some(ChartMark::at(sweeps, value, 3.6, format!("{what}, {}", shown(value, unit))))
                 };
                 Series::line(Style::of(solver), own.filter_map(mark).collect())
             };
@@ -328,7 +332,7 @@ pub fn iterations(records: &[Record]) -> Vec<Chart> {
                 title: scene[0].scene.clone(),
                 x: axis("sweeps of a step", Scale::log(marks().map(|m| m.x), "")),
                 y: axis(error.name(), Scale::log(marks().map(|m| m.y), unit)),
-                strip: Strip::None,
+                strip: FailStrip::None,
                 good: [None; 2],
                 series,
             });
@@ -374,14 +378,14 @@ fn sweep_chart(scene: &[Record], swept: Swept, error: Option<ErrorAxis>, unit: &
                             r.sample.as_ref().map(|s| s.quartiles_ns.map(|ns| (1e-9 * ns).max(1e-12)));
                         let bar = quartiles.filter(|_| error.is_none() && !is_dt);
                         let text = if unit == "s" { si(y, "s") } else { shown(y, unit) };
-                        Mark { bar, ..Mark::at(at(r), y, 3.8, format!("{what}: {text}")) }
+                        ChartMark { bar, ..ChartMark::at(at(r), y, 3.8, format!("{what}: {text}")) }
                     }
                     None => {
                         let title = format!("{what}: {}", by_scene::verdict(r));
-                        Mark { fails: true, ..Mark::at(at(r), 0.0, 3.2, title) }
+                        ChartMark { fails: true, ..ChartMark::at(at(r), 0.0, 3.2, title) }
                     }
                 };
-                Mark { hollow: serial, ..mark }
+                ChartMark { hollow: serial, ..mark }
             };
             let marks = own.iter().map(mark).collect();
             series.push(Series { dashed: serial, ..Series::line(Style::of(solver), marks) });
@@ -397,7 +401,7 @@ fn sweep_chart(scene: &[Record], swept: Swept, error: Option<ErrorAxis>, unit: &
         title: String::new(),
         x: axis(swept.name, Scale::at(&values, swept.unit)),
         y: axis(name, Scale::log(settings.iter().filter_map(|r| value(r)).chain(limit), unit)),
-        strip: Strip::Top,
+        strip: FailStrip::Top,
         // In some scenes the tolerance depends on the swept value.
         good: [None, limit.filter(|_| settings.iter().all(|r| tolerance(r) == limit))],
         series,

@@ -2,7 +2,7 @@
 
 use crate::lab::chart::scale::number;
 use crate::lab::picture::Color;
-use crate::lab::report::doc::{Block, Cell, DocTable, Tone};
+use crate::lab::report::doc::{DocBlock, DocCell, DocTable, Tone};
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -63,7 +63,7 @@ fn word(value: &Value) -> String {
 }
 
 /// The matrix as a table.
-pub fn matrix(matrix: &VerifyFile) -> Vec<Block> {
+pub fn matrix(matrix: &VerifyFile) -> Vec<DocBlock> {
     let mut solvers: Vec<&str> = Vec::new();
     for outcome in &matrix.results {
         if !solvers.contains(&outcome.solver.as_str()) {
@@ -78,14 +78,14 @@ pub fn matrix(matrix: &VerifyFile) -> Vec<Block> {
             let found = matrix.results.iter().find(|o| o.case == case.case && o.solver == **solver);
             found.map_or_else(|| "n/a".into(), cell_of)
         };
-        let names = [Cell::from(format!("{}{star}", case.case)), case.what.as_str().into()];
+        let names = [DocCell::from(format!("{}{star}", case.case)), case.what.as_str().into()];
         rows.row(names.into_iter().chain(solvers.iter().map(cell)));
     }
     let legend = "A cell is error ÷ tolerance: up to 1 passes, ✗ fails. *: required of the default solver.";
-    vec![Block::Table(rows), Block::Text(Tone::Soft, legend.into())]
+    vec![DocBlock::Table(rows), DocBlock::Text(Tone::Soft, legend.into())]
 }
 
-fn cell_of(outcome: &MatrixCell) -> Cell {
+fn cell_of(outcome: &MatrixCell) -> DocCell {
     let Some(passed) = outcome.passed else { return "n/a".into() };
     let margin = margin_of(outcome);
     let (color, white) = shade(margin, passed);
@@ -95,7 +95,7 @@ fn cell_of(outcome: &MatrixCell) -> Cell {
         [&outcome.measured, &outcome.reference, &outcome.tolerance].map(word);
     let numbers = format!("measured {measured}, reference {reference} ± {tolerance}");
     let css = format!("background:{color};color:{}", if white { "#fff" } else { "#1f2933" });
-    Cell { css, title: outcome.reason.clone().unwrap_or(numbers), ..format!("{sign}{shown}").into() }
+    DocCell { css, title: outcome.reason.clone().unwrap_or(numbers), ..format!("{sign}{shown}").into() }
 }
 
 /// A number with two digits.

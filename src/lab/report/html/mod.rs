@@ -9,7 +9,7 @@
 pub mod charts;
 mod matrix;
 
-use super::doc::{self, Block, Cell, DocTable, Tone};
+use super::doc::{self, DocBlock, DocCell, DocTable, Tone};
 use super::style::Style;
 use super::{answer, by_scene, sweep};
 use crate::engine::clock::Phase;
@@ -76,10 +76,10 @@ fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, Error> {
 }
 
 /// A section of the page: its anchor, its title, and its content.
-type Section = (&'static str, &'static str, Vec<Block>);
+type Section = (&'static str, &'static str, Vec<DocBlock>);
 
-fn plain(text: &str) -> Block {
-    Block::Text(Tone::Plain, text.to_string())
+fn plain(text: &str) -> DocBlock {
+    DocBlock::Text(Tone::Plain, text.to_string())
 }
 
 /// The sections of a study.
@@ -90,8 +90,8 @@ fn sections(
 ) -> Vec<Section> {
     let records = &study.records[..];
     let solvers = solvers_of(records);
-    let legend = || Block::Html(legend(solvers.iter().map(|s| (*s, Style::of(s)))));
-    let machine = ("machine", "Machine, settings and command", vec![Block::Html(machine(study))]);
+    let legend = || DocBlock::Html(legend(solvers.iter().map(|s| (*s, Style::of(s)))));
+    let machine = ("machine", "Machine, settings and command", vec![DocBlock::Html(machine(study))]);
     if let Some(swept) = records.iter().find_map(|r| r.swept) {
         let lead = format!(
             "Time and errors against {}, one curve per solver. A mark is a setting at its fastest lane width; hollow marks are in natural order. Bars are the quartiles of the blocks of steps. The shaded side is within the scene’s tolerance. Settings that fail are in the strip “fails” at the top and break the curve. The settings of a scene were timed interleaved.",
@@ -99,11 +99,11 @@ fn sections(
         );
         let mut blocks = vec![plain(&lead), legend()];
         for scene in charts::scenes(records) {
-            blocks.push(Block::Heading(scene[0].scene.clone(), by_scene::scene_line(scene)));
-            blocks.push(Block::Charts("four", charts::sweep(scene, swept)));
+            blocks.push(DocBlock::Heading(scene[0].scene.clone(), by_scene::scene_line(scene)));
+            blocks.push(DocBlock::Charts("four", charts::sweep(scene, swept)));
             blocks.push(plain(&sweep::reached(scene, swept)));
             let folded = "All settings of this scene".to_string();
-            blocks.push(Block::Table(DocTable { folded, ..sweep::scene_table(scene, swept) }));
+            blocks.push(DocBlock::Table(DocTable { folded, ..sweep::scene_table(scene, swept) }));
         }
         return vec![("sweep", "Sweep", blocks), machine];
     }
@@ -116,7 +116,7 @@ fn sections(
                 "Small marks: every solver and budget on every scene, in colored order, at its fastest lane width. Large marks: the geometric mean of a budget over all scenes, from its first budget on each scene to its last; hollow ones omit scenes on which it fails, and their names say how many. Lower left is better; settings that fail are in the strip “fails” at the right.",
             ),
             legend(),
-            Block::Charts("one", vec![chart]),
+            DocBlock::Charts("one", vec![chart]),
         ],
         None => vec![plain("No setting holds on any scene.")],
     };
@@ -133,7 +133,7 @@ fn sections(
             header: header.clone(),
         };
         let panels: Vec<RecordingPanel> = recordings.iter().map(panel).collect();
-        let player = Block::Html(fragment(&panels, 0.6));
+        let player = DocBlock::Html(fragment(&panels, 0.6));
         made.push(("replay", "Replay of the most telling scene", vec![plain(&lead), player]));
     }
     let mut by_scenes = vec![
@@ -146,34 +146,34 @@ fn sections(
         let (table, notes) = by_scene::scene_table(scene);
         let folded = "All settings of this scene".to_string();
         by_scenes.extend([
-            Block::Heading(scene[0].scene.clone(), bodies(scene[0].bodies)),
-            Block::Charts("three", charts::precision(scene)),
-            Block::Table(DocTable { folded, ..table }),
-            Block::Text(Tone::Bad, notes),
+            DocBlock::Heading(scene[0].scene.clone(), bodies(scene[0].bodies)),
+            DocBlock::Charts("three", charts::precision(scene)),
+            DocBlock::Table(DocTable { folded, ..table }),
+            DocBlock::Text(Tone::Bad, notes),
         ]);
     }
-    by_scenes.push(Block::Text(Tone::Soft, by_scene::LEGEND.to_string()));
+    by_scenes.push(DocBlock::Text(Tone::Soft, by_scene::LEGEND.to_string()));
     made.push(("scenes", "Scene by scene", by_scenes));
     let mut profiles = vec![
         plain(
             "The share of scenes that a solver solves within a factor of the fastest. Upper left is better. Lines that coincide are drawn beside each other.",
         ),
         legend(),
-        Block::Charts("three", charts::profiles(records)),
-        Block::Table(by_scene::profile_table(records)),
+        DocBlock::Charts("three", charts::profiles(records)),
+        DocBlock::Table(by_scene::profile_table(records)),
     ];
-    profiles.extend(by_scene::order_tables(records).into_iter().map(Block::Table));
+    profiles.extend(by_scene::order_tables(records).into_iter().map(DocBlock::Table));
     made.push(("profiles", "Performance profiles", profiles));
     let lanes = charts::over_lanes(records);
     if !lanes.is_empty() {
         let lead = "Each solver at the middle one of its budgets in colored order: speed-up over one lane, and the share of lanes that hold a contact.";
-        made.push(("lanes", "Lanes", vec![plain(lead), legend(), Block::Charts("four", lanes)]));
+        made.push(("lanes", "Lanes", vec![plain(lead), legend(), DocBlock::Charts("four", lanes)]));
     }
     let lead = "Each solver at the middle one of its budgets and its fastest lane width (budget@lanes): median time of each phase (µs), and its share.";
     let phases = std::iter::once(plain(lead)).chain(phases(records)).collect();
     made.push(("phases", "Time per phase", phases));
     let lead = "Constraint sweeps per step, of every kind; settings that hold, in colored order.";
-    let iterations = Block::Charts("four", charts::iterations(records));
+    let iterations = DocBlock::Charts("four", charts::iterations(records));
     made.push(("iterations", "Iterations against error", vec![plain(lead), legend(), iterations]));
     let cases = match matrix {
         Some(found) => matrix::matrix(found),
@@ -187,7 +187,7 @@ fn sections(
 }
 
 /// Median time per phase: a table per scene, a line per solver, shaded by its share.
-fn phases(records: &[Record]) -> Vec<Block> {
+fn phases(records: &[Record]) -> Vec<DocBlock> {
     let used: Vec<Phase> = Phase::ALL
         .into_iter()
         .filter(|&p| records.iter().any(|r| r.sample.as_ref().is_some_and(|s| s.phase_ns[p as usize] > 0.0)))
@@ -204,12 +204,13 @@ fn phases(records: &[Record]) -> Vec<Block> {
                 let ns = sample.phase_ns[phase as usize];
                 let share = (100.0 * ns / whole.max(1.0)).round();
                 let css = format!("--share: {share}%");
-                Cell { css, title: format!("{share} %"), ..digits(1e-3 * ns).into() }
+                let time = if ns > 0.0 { digits(1e-3 * ns) } else { String::new() };
+                DocCell { css, title: format!("{share} %"), ..time.into() }
             };
-            let setting = Cell::from(charts::short_words(record) + broken);
-            rows.row([Cell::solver(record.solver), setting].into_iter().chain(used.iter().map(cell)));
+            let setting = DocCell::from(charts::short_words(record) + broken);
+            rows.row([DocCell::solver(record.solver), setting].into_iter().chain(used.iter().map(cell)));
         }
-        Block::Table(rows)
+        DocBlock::Table(rows)
     };
     charts::scenes(records).into_iter().map(table).collect()
 }
@@ -227,7 +228,7 @@ fn page(study: &StudyFile, matrix: Option<&VerifyFile>, recordings: &[(Vec<u8>, 
         e.native_lanes,
         e.version,
     );
-    let top = [Block::Text(Tone::Soft, head), Block::Text(Tone::Bad, study.caution())];
+    let top = [DocBlock::Text(Tone::Soft, head), DocBlock::Text(Tone::Bad, study.caution())];
     let link = |(id, title, _): &Section| format!("<a href=\"#{id}\">{title}</a> ");
     let body = |(id, title, blocks): &Section| {
         format!("<section id=\"{id}\">\n<h2>{title}</h2>\n{}</section>\n", doc::html(blocks))
