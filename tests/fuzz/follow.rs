@@ -14,7 +14,7 @@ use simpulse::lab::converge::{self, ConvergeOptions};
 use simpulse::lab::error::Error;
 use simpulse::lab::metrics::Observation;
 use simpulse::lab::overrides::{self, Override};
-use simpulse::lab::picture::Color;
+use simpulse::lab::chart::Style;
 use simpulse::lab::reference::certify::reference;
 use simpulse::lab::reference::frozen::Frozen;
 use simpulse::lab::scenes::{self, Scene};
@@ -180,11 +180,8 @@ pub fn frozen(input: &[u8], salt: u64) -> Result<String, String> {
     let curves = match converge::converge(problem, known.as_ref(), &options) {
         Ok(report) => {
             converge::table::text(&report);
-            let written = [
-                converge::table::csv(&report),
-                converge::table::json(&report),
-                converge::plot::svg(&report, &|_| Color::rgb(0)),
-            ];
+            converge::plot::svg(&report, &|_| Style::at(0));
+            let written = [converge::table::csv(&report), converge::table::json(&report)];
             for text in written {
                 text.map_err(|e| format!("report: not written, {e}"))?;
             }

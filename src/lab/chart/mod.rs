@@ -17,7 +17,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 pub use scale::Scale;
 pub use style::Style;
 
-type Surface<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type PlotArea<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Drawing = Result<(), Box<dyn std::error::Error>>;
 type Pixel = (i32, i32);
 
@@ -266,7 +266,7 @@ impl PlotFrame<'_> {
     }
 
     /// Paper, shades, and the strip.
-    fn ground(&self, area: &Surface) -> Drawing {
+    fn ground(&self, area: &PlotArea) -> Drawing {
         let PlotFrame { left, right, top, bottom, .. } = *self;
         let [x, y] = self.chart.good;
         if x.is_some() || y.is_some() {
@@ -288,7 +288,7 @@ impl PlotFrame<'_> {
     }
 
     /// Grid, ticks, their labels, and the names of the axes.
-    fn axes(&self, area: &Surface) -> Drawing {
+    fn axes(&self, area: &PlotArea) -> Drawing {
         let PlotFrame { left, right, top, bottom, chart } = *self;
         let (x, y) = (&chart.x, &chart.y);
         for (value, label) in &y.scale.ticks {
@@ -332,7 +332,7 @@ impl PlotFrame<'_> {
         Ok(())
     }
 
-    fn series(&self, area: &Surface, series: &Series) -> Drawing {
+    fn series(&self, area: &PlotArea, series: &Series) -> Drawing {
         let crate::lab::picture::Color(r, g, b, _) = series.style.rgb();
         let (solid, faint) = (RGBColor(r, g, b), RGBColor(r, g, b).mix(series.opacity));
         for part in series.marks.chunk_by(|a, b| !a.fails && !b.fails).filter(|part| !part[0].fails) {
@@ -374,7 +374,7 @@ impl PlotFrame<'_> {
 }
 
 /// Text in ink, anchored at its left, middle or right.
-fn write(area: &Surface, text: &str, at: Pixel, size: i32, anchor: HPos) -> Drawing {
+fn write(area: &PlotArea, text: &str, at: Pixel, size: i32, anchor: HPos) -> Drawing {
     let style = ("sans-serif", size).into_font().color(&INK).pos(Pos::new(anchor, VPos::Center));
     area.draw(&Text::new(text.to_string(), at, style))?;
     Ok(())
@@ -393,7 +393,13 @@ struct Labels {
 impl Labels {
     /// The left end of a label next to a mark of radius `r`, and, if it is far away, the end at which a line should
     /// lead to it. `None` if there is no free place.
-    fn place(&mut self, (x, y): Pixel, r: i32, label: &str, frame: &PlotFrame) -> Option<(Pixel, Option<Pixel>)> {
+    fn place(
+        &mut self,
+        (x, y): Pixel,
+        r: i32,
+        label: &str,
+        frame: &PlotFrame,
+    ) -> Option<(Pixel, Option<Pixel>)> {
         let (width, half) = (6 * label.chars().count() as i32, LABEL / 2);
         // Only a large chart has room for labels far away.
         let most = if frame.chart.size[0] > 600 { 4 } else { 1 };
@@ -526,8 +532,10 @@ mod tests {
 
     #[test]
     fn a_file_holds_all_charts_and_follows_the_page() {
-        let rows =
-            [("one".to_string(), vec![chart(FailStrip::Right), chart(FailStrip::None)]), ("two".to_string(), vec![])];
+        let rows = [
+            ("one".to_string(), vec![chart(FailStrip::Right), chart(FailStrip::None)]),
+            ("two".to_string(), vec![]),
+        ];
         let file = file("title", &[("pgs", Style::at(0))], &rows);
         assert_eq!((file.matches("<svg ").count(), file.matches("</svg>").count()), (3, 3));
         assert!(file.contains("prefers-color-scheme: dark") && file.contains("width=\"840\""));

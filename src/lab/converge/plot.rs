@@ -7,7 +7,7 @@
 use super::replay::{Sequence, Start};
 use super::warm::WarmStartSource;
 use super::{ConvergeReport, CurvePoint, Reached, ReplayCurve, TOLERANCES};
-use crate::lab::chart::{self, Axis, Chart, ChartMark, Scale, Series, FailStrip, Style};
+use crate::lab::chart::{self, Axis, Chart, ChartMark, FailStrip, Scale, Series, Style};
 
 /// Residuals that are shown. Values outside are drawn at the edge.
 const SHOWN: [f64; 2] = [1e-8, 10.0];
@@ -111,7 +111,10 @@ fn chart(report: &ConvergeReport, law: &LawRow, styles: Styles, by_time: bool) -
                     let (solver, order) = (&curve.solver, &curve.order);
                     format!("{solver}, {order}: {:.0e} after {} iterations", TOLERANCES[k], point.iterations)
                 });
-                Some(ChartMark { hollow: curve.order == Sequence::Colored, ..ChartMark::at(x, y, size, title) })
+                Some(ChartMark {
+                    hollow: curve.order == Sequence::Colored,
+                    ..ChartMark::at(x, y, size, title)
+                })
             };
             let marks = curve.points.iter().enumerate().filter_map(mark).collect();
             let (dashed, single) = (curve.order != Sequence::Natural, curve.arithmetic == "f32");

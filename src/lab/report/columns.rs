@@ -53,7 +53,12 @@ fn listed(columns: &[[&'static str; 3]]) -> Vec<Column> {
 /// The value of a cell of `study.csv`; null leaves it empty.
 type StudyCell = fn(&Record, &Environment) -> Value;
 
-const fn cell(name: &'static str, unit: &'static str, meaning: &'static str, of: StudyCell) -> (Column, StudyCell) {
+const fn cell(
+    name: &'static str,
+    unit: &'static str,
+    meaning: &'static str,
+    of: StudyCell,
+) -> (Column, StudyCell) {
     (Column { name, unit, meaning }, of)
 }
 
@@ -241,8 +246,9 @@ pub fn study_csv(records: &[Record], environment: &Environment) -> Result<Vec<u8
         writer.write_record(fixed.map(|c| c.name.to_string()).chain(phases)).map_err(failed)?;
     }
     for record in records {
-        let cells =
-            |list: &[(Column, StudyCell)]| list.iter().map(|(_, of)| of(record, environment)).collect::<Vec<_>>();
+        let cells = |list: &[(Column, StudyCell)]| {
+            list.iter().map(|(_, of)| of(record, environment)).collect::<Vec<_>>()
+        };
         let metrics = METRICS.iter().map(|m| record.errors.and_then(|e| e.get(m.name)).into());
         let phases = Phase::ALL.map(|p| record.sample.as_ref().map(|s| s.phase_ns[p as usize]).into());
         let line = cells(SETTING).into_iter().chain(metrics).chain(cells(VERDICT)).chain(phases);

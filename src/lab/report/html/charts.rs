@@ -2,7 +2,7 @@
 
 use crate::engine::constraints::Impacts;
 use crate::lab::chart::scale::number;
-use crate::lab::chart::{self, Axis, Chart, LineStyle, ChartMark, Scale, Series, FailStrip, Style};
+use crate::lab::chart::{self, Axis, Chart, ChartMark, FailStrip, LineStyle, Scale, Series, Style};
 use crate::lab::report::by_scene;
 use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, solvers_of};
 use crate::lab::study::sweep::Swept;
@@ -107,7 +107,8 @@ fn precision_chart(
         .filter_map(|r| Some(ChartMark::at(drawn(r, error)?, time(r)?, 0.0, String::new())))
         .collect();
     front.sort_by(|a, b| a.x.total_cmp(&b.x));
-    let front = Series { line: LineStyle::Steps, width: 6, opacity: 0.3, ..Series::line(Style::neutral(), front) };
+    let front =
+        Series { line: LineStyle::Steps, width: 6, opacity: 0.3, ..Series::line(Style::neutral(), front) };
     let mut series = vec![front];
     for solver in solvers_of(scene) {
         let kinds =
@@ -135,7 +136,8 @@ fn precision_chart(
                 Some(ChartMark { hollow: serial, ..mark })
             };
             let marks: Vec<ChartMark> = own.enumerate().filter_map(mark).collect();
-            let (failed, held): (Vec<ChartMark>, Vec<ChartMark>) = marks.into_iter().partition(|mark| mark.fails);
+            let (failed, held): (Vec<ChartMark>, Vec<ChartMark>) =
+                marks.into_iter().partition(|mark| mark.fails);
             let style = Style::of(solver);
             series.push(Series { dashed: serial, ..Series::line(style, held) });
             series.push(Series::marks(style, failed));
@@ -180,7 +182,9 @@ pub fn overview(records: &[Record]) -> Option<Chart> {
         let small = own().map(|(r, slower, _)| {
             let title = format!("{solver} on {}: {}, {}× the fastest", r.scene, words(r), number(*slower));
             match wrong(r) {
-                Some(x) => ChartMark::at(x, *slower, 2.6, format!("{title}, error {} × tolerance", number(x))),
+                Some(x) => {
+                    ChartMark::at(x, *slower, 2.6, format!("{title}, error {} × tolerance", number(x)))
+                }
                 None => {
                     let title = format!("{title}: {}", by_scene::verdict(r));
                     ChartMark { fails: true, ..ChartMark::at(0.0, *slower, 2.6, title) }
