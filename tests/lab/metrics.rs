@@ -570,14 +570,9 @@ fn discs_that_touch_part_and_touch_again_hold_no_depth() {
         for gap in [0.010, 0.025] {
             let mut world = build(&scene, solver);
             let mut observation = Observation::new(&world);
-            for step in 0..12 {
-                let speed = if step < 3 {
-                    0.0
-                } else if step < 6 {
-                    20.0 * gap
-                } else {
-                    -20.0 * gap
-                };
+            // Twice within half a second: seen again without a contact, the pair has been seen before.
+            for step in 0..24 {
+                let speed = [0.0, 20.0, -20.0, -20.0][step % 12 / 3] * gap;
                 world.bodies.velocity_x[1] = speed as f32;
                 world.step().unwrap();
                 observation.observe(&world);
@@ -591,7 +586,7 @@ fn discs_that_touch_part_and_touch_again_hold_no_depth() {
     }
 }
 
-/// Over a run of 1.2 s the distance to the limit is of first order in the step: an eighth of the step leaves at most a
+/// Over a run of 1.4 s the distance to the limit is of first order in the step: an eighth of the step leaves at most a
 /// quarter of it, down to four roundings in each step. When in a step bodies meet is up to chance, so each distance is
 /// the largest of several rates.
 #[test]
@@ -614,8 +609,8 @@ fn metrics_converge_as_the_step_goes_to_zero() {
     let cases: [(&Scene, &str, &str, f64); 14] = [
         (&fall, "pgs", "energy_change", 0.0),
         (&fall, "pgs", "momentum", 0.0),
-        // The last second of 1.2 s, from 2 to 12 m/s.
-        (&fall, "pgs", "rest_speed_m_s", ((12.0_f64.powi(3) - 2.0_f64.powi(3)) / 30.0).sqrt()),
+        // The last second of 1.4 s, from 4 to 14 m/s.
+        (&fall, "pgs", "rest_speed_m_s", ((14.0_f64.powi(3) - 4.0_f64.powi(3)) / 30.0).sqrt()),
         (&drop, "pgs", "flight_depth_max_m", 0.0),
         (&drop, "pgs", "penetration_max_m", 0.0),
         (&drop, "pgs", "held_depth_p99_m", 0.0),
@@ -625,7 +620,7 @@ fn metrics_converge_as_the_step_goes_to_zero() {
         (&slide, "pgs", "energy_change", -lost),
         (&slide, "pgs", "settled_s", 0.16),
         (&slide, "pgs", "residual_tangent_rms", 0.0),
-        (&slope, "projection", "creep_m_s", 10.0 * 0.25_f64.sin() * 0.7),
+        (&slope, "projection", "creep_m_s", 10.0 * 0.25_f64.sin() * 0.9),
         (&slope, "projection", "momentum", 0.0),
     ];
     for (scene, solver, name, limit) in cases {
@@ -634,13 +629,13 @@ fn metrics_converge_as_the_step_goes_to_zero() {
             scene.dt = 1.0 / f64::from(rate);
             let mut world = build(&scene, solver);
             world.settings.budget.velocity_iterations = 50;
-            let errors = observe(&mut world, rate * 6 / 5);
+            let errors = observe(&mut world, rate * 7 / 5);
             (at(&errors, name) - limit).abs()
         };
         let largest =
             |factor: u32| [50, 55, 60, 65, 70].map(|r| distance(factor * r)).into_iter().fold(0.0, f64::max);
         let (coarse, fine) = (largest(1), largest(8));
-        let rounding = 4.0 * f64::from(f32::EPSILON) * 576.0 * limit.abs().max(1.0);
+        let rounding = 4.0 * f64::from(f32::EPSILON) * 784.0 * limit.abs().max(1.0);
         assert!(fine <= (coarse / 4.0).max(rounding), "{solver}: {name} {coarse} {fine}");
     }
 }

@@ -17,7 +17,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 pub use scale::Scale;
 pub use style::Style;
 
-type Surface<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type PlotArea<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Drawing = Result<(), Box<dyn std::error::Error>>;
 type Pixel = (i32, i32);
 
@@ -266,7 +266,7 @@ impl PlotFrame<'_> {
     }
 
     /// Paper, shades, and the strip.
-    fn ground(&self, area: &Surface) -> Drawing {
+    fn ground(&self, area: &PlotArea) -> Drawing {
         let PlotFrame { left, right, top, bottom, .. } = *self;
         let [x, y] = self.chart.good;
         if x.is_some() || y.is_some() {
@@ -288,7 +288,7 @@ impl PlotFrame<'_> {
     }
 
     /// Grid, ticks, their labels, and the names of the axes.
-    fn axes(&self, area: &Surface) -> Drawing {
+    fn axes(&self, area: &PlotArea) -> Drawing {
         let PlotFrame { left, right, top, bottom, chart } = *self;
         let (x, y) = (&chart.x, &chart.y);
         for (value, label) in &y.scale.ticks {
@@ -332,7 +332,7 @@ impl PlotFrame<'_> {
         Ok(())
     }
 
-    fn series(&self, area: &Surface, series: &Series) -> Drawing {
+    fn series(&self, area: &PlotArea, series: &Series) -> Drawing {
         let crate::lab::picture::Color(r, g, b, _) = series.style.rgb();
         let (solid, faint) = (RGBColor(r, g, b), RGBColor(r, g, b).mix(series.opacity));
         for part in series.marks.chunk_by(|a, b| !a.fails && !b.fails).filter(|part| !part[0].fails) {
@@ -374,7 +374,7 @@ impl PlotFrame<'_> {
 }
 
 /// Text in ink, anchored at its left, middle or right.
-fn write(area: &Surface, text: &str, at: Pixel, size: i32, anchor: HPos) -> Drawing {
+fn write(area: &PlotArea, text: &str, at: Pixel, size: i32, anchor: HPos) -> Drawing {
     let style = ("sans-serif", size).into_font().color(&INK).pos(Pos::new(anchor, VPos::Center));
     area.draw(&Text::new(text.to_string(), at, style))?;
     Ok(())

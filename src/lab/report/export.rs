@@ -10,7 +10,7 @@ use crate::lab::overrides;
 use crate::lab::study::{Record, StudyPlan, search};
 use serde_json::{Value, json};
 
-/// `study.csv`, see [`columns`](super::columns).
+/// `study.csv`, see [`columns`].
 pub fn csv(records: &[Record], environment: &Environment) -> Result<Vec<u8>, Error> {
     columns::study_csv(records, environment)
 }
