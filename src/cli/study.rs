@@ -279,9 +279,6 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     let found_out: String =
         plan.find_out()?.iter().map(|line| answer::wrapped(&format!("{line}\n"))).collect();
     let earlier = if args.resume { Some(earlier(&args.out, &plan)?) } else { None };
-    // Fail before the long computation, not after it.
-    files::prepare_folder(&args.out)?;
-    let lock = files::Lock::of(&args.out)?;
     let steps = plan.steps;
     let mut results = StudyResults {
         out: &args.out,
@@ -292,6 +289,11 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
         found: Found::default(),
         kept: None,
     };
+    // Before the folder is in use, so that a signal always has an answer.
+    results.say(&results.plan.scenes);
+    // Fail before the long computation, not after it.
+    files::prepare_folder(&args.out)?;
+    let lock = files::Lock::of(&args.out)?;
     let bar = Bar::new();
     let study = results.run(&|p| bar.show(p.done, p.total, p.what))?;
     drop(bar);
