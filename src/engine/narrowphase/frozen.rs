@@ -33,7 +33,7 @@
 //! Contacts of discs are never frozen: their points do not stay fixed on them.
 
 use super::batch::{NO_CONTACT, PairKind};
-use super::candidate::Candidates;
+use super::candidate::{Candidate, Candidates};
 use super::lanes::PoseRow;
 use crate::contacts::Contact;
 use glam::Vec2;
@@ -111,6 +111,9 @@ pub struct FrozenContacts {
     /// Whether the manifold of each candidate is kept in this step; empty if nothing is frozen. `[candidates]`
     #[cfg_attr(feature = "serde", serde(skip))]
     keep: Vec<bool>,
+    /// Farthest point of each body from its center, 0 if it is static (m).
+    #[cfg_attr(feature = "serde", serde(skip))]
+    extents: Vec<f32>,
 }
 
 /// x_b − x_a, including the low parts of the positions (m), and both rotations.
@@ -143,15 +146,15 @@ impl FrozenManifold {
         found
     }
 
-    /// Whether the bodies have moved by less than the limits; `extent` is ρ (m).
-    fn is_near(&self, bodies: [&PoseRow; 2], extent: f32, limits: FreezeLimits) -> bool {
+    /// Whether the bodies have moved by less than a distance (m) and turned by less than the angle of this cosine;
+    /// `extent` is ρ (m).
+    fn is_near(&self, bodies: [&PoseRow; 2], extent: f32, distance: f32, least_cosine: f32) -> bool {
         let (d, [a, b]) = poses(bodies);
         let [a_0, b_0] = self.turns;
         let sine = unrotate(a, b).perp_dot(unrotate(a_0, b_0)).abs();
-        let least = limits.turn.cos();
-        (unrotate(a, d) - self.offset).length() + extent * sine < limits.distance
-            && a.dot(a_0) > least
-            && b.dot(b_0) > least
+        (unrotate(a, d) - self.offset).length() + extent * sine < distance
+            && a.dot(a_0) > least_cosine
+            && b.dot(b_0) > least_cosine
     }
 
     /// Writes the separations for the current poses of the bodies.
@@ -173,36 +176,37 @@ impl FrozenContacts {
     }
 
     /// Updates the separations of frozen contacts to the current poses, and thaws those whose bodies have moved.
-    /// `extents`: the farthest point of each body from its center, 0 if it is static (m).
+    /// `reaches`: the body of each shape, and its farthest point from the center of that body, 0 if the body is
+    /// static (m).
     pub fn update(
         &mut self,
         candidates: Candidates<'_>,
         contacts: &mut [Contact],
         limits: Option<FreezeLimits>,
-        extents: &[f32],
+        reaches: impl Iterator<Item = (u32, f32)>,
     ) {
         self.keep.clear();
-        let Some(limits) = limits else {
+        let Some(FreezeLimits { distance, turn, loaded_only }) = limits else {
             self.found.iter_mut().for_each(Vec::clear);
             return;
         };
         self.keep.resize(candidates.all.len(), false);
+        self.extents.clear();
+        self.extents.resize(candidates.poses.len(), 0.0);
+        for (body, reach) in reaches {
+            let extent = &mut self.extents[body as usize];
+            *extent = extent.max(reach);
+        }
+        let least_cosine = turn.cos();
         for (found, kind) in self.found.iter().zip(KINDS) {
-            let mut found = found.iter().peekable();
-            for (place, candidate, bodies) in candidates.of(kind) {
-                let pair = candidate.pair();
-                while found.next_if(|f| f.pair < pair).is_some() {}
-                let Some(found) = found.next_if(|f| f.pair == pair) else { continue };
-                if candidate.contact == NO_CONTACT {
-                    continue;
-                }
+            for (place, candidate, bodies, found) in touching(candidates, kind, found) {
+                let Some(found) = found else { continue };
                 let contact = &mut contacts[candidate.contact as usize];
-                let extent =
-                    candidate.bodies.map(|body| extents[body as usize]).into_iter().fold(0.0, f32::max);
+                let [a, b] = candidate.bodies.map(|body| self.extents[body as usize]);
                 let bears = contact.manifold.points().iter().filter(|p| p.normal_impulse > 0.0).count() == 2;
-                if found.is_near(bodies, extent, limits) && (bears || !limits.loaded_only) {
+                if found.is_near(bodies, a.max(b), distance, least_cosine) && (bears || !loaded_only) {
                     found.follow(contact, bodies);
-                    self.keep[place as usize] = true;
+                    self.keep[place] = true;
                 }
             }
         }
@@ -216,17 +220,27 @@ impl FrozenContacts {
         std::mem::swap(&mut self.found, &mut self.last_found);
         for ((found, last), kind) in self.found.iter_mut().zip(&self.last_found).zip(KINDS) {
             found.clear();
-            let mut last = last.iter().peekable();
-            for (place, candidate, bodies) in candidates.of(kind) {
-                if candidate.contact == NO_CONTACT {
-                    continue;
-                }
-                let pair = candidate.pair();
-                while last.next_if(|f| f.pair < pair).is_some() {}
-                let old = last.next_if(|f| f.pair == pair).filter(|_| self.keep[place as usize]);
+            found.extend(touching(candidates, kind, last).map(|(place, candidate, bodies, old)| {
                 let contact = &mut contacts[candidate.contact as usize];
-                found.push(old.copied().unwrap_or_else(|| FrozenManifold::new(pair, contact, bodies)));
-            }
+                let old = old.filter(|_| self.keep[place]).copied();
+                old.unwrap_or_else(|| FrozenManifold::new(candidate.pair(), contact, bodies))
+            }));
         }
     }
+}
+
+/// The candidates of a kind that have a contact: index, candidate, poses, and the entry of the pair in `found`, which
+/// is sorted by pair.
+fn touching<'a>(
+    candidates: Candidates<'a>,
+    kind: PairKind,
+    found: &'a [FrozenManifold],
+) -> impl Iterator<Item = (usize, &'a Candidate, [&'a PoseRow; 2], Option<&'a FrozenManifold>)> {
+    let mut found = found.iter().peekable();
+    let with_contact = candidates.of(kind).filter(|(_, candidate, _)| candidate.contact != NO_CONTACT);
+    with_contact.map(move |(place, candidate, bodies)| {
+        let pair = candidate.pair();
+        while found.next_if(|f| f.pair < pair).is_some() {}
+        (place as usize, candidate, bodies, found.next_if(|f| f.pair == pair))
+    })
 }

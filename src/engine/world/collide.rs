@@ -28,11 +28,7 @@ pub(super) struct Narrow {
     pub is_changed: bool,
     /// Whether the jobs are all candidates with their current contacts.
     pub jobs_are_current: bool,
-    /// The solver's requests to the collision phase.
-    asked: Collision,
     pub frozen: FrozenContacts,
-    /// Farthest point of each body from its center, 0 if it is static (m); only filled if contacts are frozen.
-    extents: Vec<f32>,
     poses: Vec<PoseRow>,
     ways: Vec<Quad>,
     jobs: [Jobs; PairKind::ALL.len()],
@@ -91,23 +87,16 @@ impl World {
         let mut asked = Collision::default();
         self.with_scene(|solver, scene| solver.before_collision(scene, &mut asked));
         let narrow = &mut self.narrow;
-        narrow.asked = asked;
-        let limits = self.settings.freezing();
-        narrow.extents.clear();
-        if limits.is_some() {
-            narrow.extents.resize(self.bodies.len(), 0.0);
-            for (surface, &body) in self.surfaces.iter().zip(&self.shape_body) {
-                let extent = &mut narrow.extents[body as usize];
-                let moves = self.bodies.kind[body as usize] != BodyKind::Static;
-                *extent = if moves { extent.max(surface.reach) } else { 0.0 };
-            }
-        }
-        let Narrow { candidates, of_kind, poses, frozen, extents, .. } = narrow;
-        frozen.update(Candidates { all: candidates, of_kind, poses }, &mut self.contacts, limits, extents);
-        let narrow = &mut self.narrow;
+        let reaches = self.surfaces.iter().zip(&self.shape_body).map(|(surface, &body)| {
+            let moves = self.bodies.kind[body as usize] != BodyKind::Static;
+            (body, if moves { surface.reach } else { 0.0 })
+        });
+        let Narrow { candidates, of_kind, poses, frozen, .. } = narrow;
+        let all = Candidates { all: candidates, of_kind, poses };
+        frozen.update(all, &mut self.contacts, self.settings.freezing(), reaches);
         let mut points = narrow.list_jobs(&self.contacts);
 
-        let Narrow { candidates, jobs, fresh, is_changed, poses, ways, shapes, asked, .. } = narrow;
+        let Narrow { candidates, jobs, fresh, is_changed, poses, ways, shapes, .. } = narrow;
         fresh.clear();
         let mut change = |name: u32, contact: &Contact| {
             let candidate = &mut candidates[name as usize];
