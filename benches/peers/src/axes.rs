@@ -1,9 +1,8 @@
-//! Parts shared by the plots: logarithmic scales, panels with ticks, text, markers, colors.
+//! Parts of the picture: logarithmic scales, panels with ticks, text, markers, colors.
 //!
 //! Axes are drawn here instead of by the chart builder, so that a panel of any range has readable ticks
 //! within tight limits.
 
-pub use crate::lab::units::wrapped;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};

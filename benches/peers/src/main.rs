@@ -14,6 +14,7 @@
 //! affects stability: a column of soft contacts buckles under its own weight, at 30 Hz from about 14 boxes
 //! on, and without recycling their columns of 20 boxes fall as those of simpulse do.
 
+mod axes;
 mod box2d;
 mod check;
 mod engine;

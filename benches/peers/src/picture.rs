@@ -3,13 +3,11 @@
 //! Both axes are logarithmic; lower left is better. A setting that failed the check has no time and no point:
 //! it is listed below its panel.
 
+use crate::axes::{Area, Drawn, Edges, INK, LogScale, color, marker, with_dark, write, write_upwards};
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 use serde::Deserialize;
-use simpulse::lab::picture::axes::{
-    Area, Drawn, Edges, INK, LogScale, color, marker, with_dark, wrapped, write, write_upwards,
-};
-use simpulse::lab::report::units::si_short;
+use simpulse::lab::report::units::{si_short, wrapped};
 
 /// What is drawn of a row of `peers.csv`.
 #[derive(Debug, Deserialize)]

@@ -5,7 +5,6 @@
 //!            [`frame`]       [`draw`]
 //! ```
 
-pub mod axes;
 pub mod draw;
 pub mod frame;
 pub mod joints;
