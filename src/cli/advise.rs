@@ -7,12 +7,12 @@ use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::world::Order;
 use crate::lab::error::Error;
 use crate::lab::profile::waiting;
-use crate::lab::report::answer::{setting, wrapped};
+use crate::lab::report::answer::{setting, worst, wrapped};
 use crate::lab::report::environment::Environment;
 use crate::lab::report::table::{error_list, finish, table};
 use crate::lab::report::units::{digits, quantity, ratio, si, si_short};
 use crate::lab::scenes::tolerance::GivenTolerances;
-use crate::lab::study::answer::{Answer, order};
+use crate::lab::study::answer::{Answer, fails_last, order};
 use crate::lab::study::{self, Record, StudyPlan, open_scene};
 use clap::Args;
 use serde_json::json;
@@ -192,9 +192,7 @@ fn text(
         text += &format!("it {}\n\n", why_not(nearest, request.max_ns));
     } else {
         text += &format!("{limits}no setting holds\n");
-        // The run that lasts longest shows most.
-        let failed = |r: &&Record| r.failed_step().unwrap_or(0);
-        if let Some(last) = records.iter().max_by_key(failed) {
+        if let Some(last) = fails_last(records) {
             text += &format!("longest: {}: {}\n", name(last), why_not(last, request.max_ns));
             text += &format!("to see it: {}\n\n", last.command_to_see(scene));
         }
@@ -278,18 +276,10 @@ fn name(record: &Record) -> String {
 
 /// Why a setting does not meet the limits.
 fn why_not(record: &Record, max_ns: f64) -> String {
-    if let Some(failure) = record.failure {
-        return failure.to_string();
-    }
-    if let Some(broken) = record.broken {
-        return broken.to_string();
-    }
-    match crate::lab::report::answer::worst(record) {
-        _ if record.excess() <= 1.0 && record.cost_ns() > max_ns => {
-            format!("takes {} a step", si(1e-9 * record.cost_ns(), "s"))
-        }
-        worst => worst,
-    }
+    record.why_failed().unwrap_or_else(|| match record.excess() <= 1.0 && record.cost_ns() > max_ns {
+        true => format!("takes {} a step", si(1e-9 * record.cost_ns(), "s")),
+        false => worst(record),
+    })
 }
 
 /// How much slower a setting is than the best one.

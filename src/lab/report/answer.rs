@@ -9,7 +9,7 @@ use crate::engine::world::Order;
 use crate::lab::scenes::CATALOG;
 use crate::lab::scenes::holds::HORIZON;
 use crate::lab::scenes::tolerance::Accuracy;
-use crate::lab::study::answer::{Answer, order, same};
+use crate::lab::study::answer::{Answer, fails_last, order, same};
 use crate::lab::study::compare::Ratio;
 use crate::lab::study::curve::{ErrorAxis, solvers_of};
 use crate::lab::study::ranking::{Ranking, Standing, ranking};
@@ -227,15 +227,12 @@ fn cheapest(scenes: &[Answer], records: &[Record]) -> (DocTable, String) {
             }
             (None, None) => {
                 notes += &format!("{}: no setting holds\n", answer.scene);
-                // The run that lasts longest shows most.
-                let own = records.iter().filter(|r| r.scene == answer.scene);
-                if let Some(last) = own.max_by_key(|r| r.failed_step().unwrap_or(0)) {
-                    let why = last.failure.map(|f| f.to_string()).or(last.broken.map(|b| b.to_string()));
+                if let Some(last) = fails_last(records.iter().filter(|r| r.scene == answer.scene)) {
                     notes += &wrapped(&format!(
                         "  longest is {}, {}: {}; to see it: {}\n",
                         last.solver,
                         budget(last),
-                        why.unwrap_or_default(),
+                        last.why_failed().unwrap_or_default(),
                         last.command_to_see(known_or_file(answer.scene))
                     ));
                 }

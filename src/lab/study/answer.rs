@@ -98,6 +98,11 @@ impl<'a> Answer<'a> {
     }
 }
 
+/// The run that fails last, of settings of which none holds: it shows most.
+pub fn fails_last<'a>(records: impl IntoIterator<Item = &'a Record>) -> Option<&'a Record> {
+    records.into_iter().max_by_key(|r| r.failed_step().unwrap_or(0))
+}
+
 /// Which of two records is faster; `Equal` if it is too close to call.
 pub fn order(a: &Record, b: &Record) -> Ordering {
     a.sample.as_ref().zip(b.sample.as_ref()).map_or(Ordering::Equal, |(a, b)| compare(a, b))

@@ -155,6 +155,11 @@ impl Record {
         self.broken.map(|b| b.step).or(self.failure.map(|f| f.step))
     }
 
+    /// Why the run failed or violates a condition of its scene; `None` if it does neither.
+    pub fn why_failed(&self) -> Option<String> {
+        self.failure.map(|f| f.to_string()).or(self.broken.map(|b| b.to_string()))
+    }
+
     /// The command that runs this setting on `scene`, a name or a file.
     pub fn command(&self, scene: &str) -> String {
         let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-.:/".contains(c);
