@@ -25,10 +25,12 @@ struct LawRow {
 
 /// The picture as SVG text.
 pub fn svg(report: &ConvergeReport, styles: Styles) -> String {
-    let mut solvers: Vec<&str> = Vec::new();
+    let mut names: Vec<(String, Style)> = Vec::new();
     for curve in &report.curves {
-        if !solvers.contains(&curve.solver.as_str()) {
-            solvers.push(&curve.solver);
+        let single = curve.arithmetic == "f32";
+        let label = if single { curve.solver.clone() } else { format!("{} (f64)", curve.solver) };
+        if names.iter().all(|(known, _)| *known != label) {
+            names.push((label, styles(name(&curve.solver))));
         }
     }
     let timed = report.curves.iter().any(|c| c.iteration.is_some());
@@ -39,7 +41,7 @@ pub fn svg(report: &ConvergeReport, styles: Styles) -> String {
         (format!("{}{notes}", law.title), by_sweeps.into_iter().chain(by_time.flatten()).collect())
     };
     let rows: Vec<(String, Vec<Chart>)> = laws(report).iter().map(row).collect();
-    let names: Vec<(&str, Style)> = solvers.into_iter().map(|s| (s, styles(name(s)))).collect();
+    let names: Vec<(&str, Style)> = names.iter().map(|(label, style)| (label.as_str(), *style)).collect();
     let title = format!(
         "{}: residual against work; solid: natural order, dashed: colored or shuffled",
         report.problem

@@ -26,7 +26,7 @@ Pareto: on the Pareto front of time against p penetration, l contact-law residua
 /// A line about the scene of these records.
 pub fn scene_line(records: &[Record]) -> String {
     let Some(first) = records.first() else { return String::new() };
-    let mut text = format!("{} · {} · dt {}", first.scene, bodies(first.bodies), si(first.dt, "s"));
+    let mut text = format!("{} · dt {}", bodies(first.bodies), si(first.dt, "s"));
     if let Some(steps) = records.iter().find_map(|r| Some(r.errors?.steps)) {
         text += &format!(" · {steps} steps");
     }
@@ -39,7 +39,7 @@ pub fn scene_line(records: &[Record]) -> String {
 /// Table of the records of one scene, and notes on those that failed.
 pub fn scene_table(records: &[Record]) -> (DocTable, String) {
     let mut rows = DocTable::new(
-        scene_line(records),
+        records.first().map_or(String::new(), |r| format!("{} · {}", r.scene, scene_line(records))),
         2,
         &[
             "solver",
