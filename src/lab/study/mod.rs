@@ -19,8 +19,6 @@ pub mod found;
 #[doc(hidden)]
 pub mod horizon;
 #[doc(hidden)]
-pub mod impacts;
-#[doc(hidden)]
 pub mod interleave;
 pub mod pace;
 #[doc(hidden)]
