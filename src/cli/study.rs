@@ -279,6 +279,11 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     let found_out: String =
         plan.find_out()?.iter().map(|line| answer::wrapped(&format!("{line}\n"))).collect();
     let earlier = if args.resume { Some(earlier(&args.out, &plan)?) } else { None };
+    let list = args.out.join(found::NAME);
+    let found = match earlier.is_some() && plan.thorough && list.is_file() {
+        true => Found::of_csv(&std::fs::read_to_string(&list).map_err(Error::io(&list))?)?,
+        false => Found::default(),
+    };
     let steps = plan.steps;
     let mut results = StudyResults {
         out: &args.out,
@@ -286,7 +291,7 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
         elsewhere,
         earlier,
         records: Vec::new(),
-        found: Found::default(),
+        found,
         kept: None,
     };
     // Before the folder is in use, so that a signal always has an answer.

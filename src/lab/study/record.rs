@@ -192,10 +192,12 @@ impl Record {
         text
     }
 
-    /// The command that draws this setting where it failed.
+    /// The command that draws this setting where it failed: after the step that violated a requirement, or
+    /// the last one before a divergence.
     pub fn command_to_see(&self, scene: &str) -> String {
-        let steps = self.failed_step().map_or(String::new(), |step| format!(" --steps {step}"));
-        format!("{}{steps} --picture failed.svg", self.command(scene))
+        let last = self.broken.map(|b| b.step).or(self.failure.map(|f| f.step.saturating_sub(1)));
+        let step = last.map_or(String::new(), |step| format!(" --step {step}"));
+        format!("{} --picture failed.svg{step}", self.command(scene))
     }
 
     /// Whether the run holds. Fronts, profiles and advice include only such settings.
