@@ -12,9 +12,10 @@
 //! ```
 //!
 //! Blocks start at other steps in every pass, so that a step left out in one pass is timed in another. The
-//! first step of a run is always timed, because it is cold in any program. The time of a step is the median
-//! over the passes: an outlier in a single pass is attributed to the machine, a recurring one to the solver.
-//! Mean, median and longest step of the run are computed from these medians.
+//! first step of a run is always timed, because it is cold in any program. The time of a step is the lower
+//! median over the passes: an outlier in a single pass is attributed to the machine, a recurring one to the
+//! solver. Mean, median and longest step of the run are computed from these times. A step that only one pass
+//! timed, while others were timed again, is left out of them: nothing confirms its time.
 //!
 //! If the thread waited for a processor, the wait is subtracted from a long step, while a block of short
 //! steps is left out. A setting that waited in every block keeps its steps without the waits but has no
@@ -258,13 +259,13 @@ impl Timing {
         if times.is_empty() {
             times = self.spare.iter().map(|&t| vec![t]).collect();
         }
-        let medians: Vec<f64> = times.iter().map(|t| median(t)).collect();
-        let middle = median(&medians);
         let repeated = times.iter().any(|t| t.len() > 1);
+        times.retain(|t| t.len() > 1 || !repeated);
+        let medians: Vec<f64> = times.iter_mut().map(|t| lower_median(t)).collect();
+        let middle = median(&medians);
         let deviations: Vec<f64> = times
             .iter()
             .zip(&medians)
-            .filter(|(t, _)| t.len() > 1 || !repeated)
             .flat_map(|(t, &own)| t.iter().map(move |t| (t - if repeated { own } else { middle }).abs()))
             .collect();
         let spread_ns = median(&deviations);
@@ -286,6 +287,13 @@ impl Timing {
             hash: self.hash,
         })
     }
+}
+
+/// The smaller of the two middle values of a list that is not empty, so that of two values an outlier is not
+/// taken.
+fn lower_median(values: &mut [f64]) -> f64 {
+    let middle = (values.len() - 1) / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// Time of a chain of dependent multiply-adds (ns), about 10 µs. No optimization can shorten it.
@@ -353,6 +361,11 @@ pub(crate) mod tests {
             (spiky.mean_ns, spiky.median_ns, spiky.worst_ns, spiky.spikes()),
             (20.0, 10.0, 210.0, 2.0)
         );
+        // A step that was left out of a pass has two times, and one that was left out of two passes has one.
+        let mut partly = vec![vec![10.0; 20]; 3];
+        (partly[0][7], partly[1][7]) = (900.0, f64::NAN);
+        (partly[0][8], partly[1][8], partly[2][8]) = (900.0, f64::NAN, f64::NAN);
+        assert_eq!((sample(partly.clone()).mean_ns, sample(partly).worst_ns), (10.0, 10.0));
         // A single pass cannot tell spikes of the solver from those of the machine.
         let mut once = vec![10.0; 20];
         once[3] = 900.0;
