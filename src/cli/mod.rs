@@ -16,15 +16,14 @@ pub mod progress;
 pub mod random;
 pub mod record;
 pub mod run;
+mod sheets;
 pub mod study;
 pub mod times;
 pub mod values;
 pub mod verify;
 
 use crate::engine::lanes::unused_cpu_features;
-use crate::engine::world::World;
 use crate::lab::error::Error;
-use crate::lab::metrics::{Errors, Observation};
 use args::{Cli, Command, CompletionArgs};
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, Parser};
@@ -142,21 +141,4 @@ fn completions(args: &CompletionArgs) -> Result<ExitCode, Error> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "simpulse", &mut script);
     print(&String::from_utf8_lossy(&script))
-}
-
-/// Runs `steps` steps. Returns the errors of the last `observed` of them; `None` without steps.
-fn settled(world: &mut World, steps: u32, observed: u32) -> Result<Option<Errors>, Error> {
-    let mut observation = None;
-    for step in 0..steps {
-        if step + observed >= steps {
-            world.settings.record_impulses = true;
-            observation.get_or_insert_with(|| Observation::new(world));
-        }
-        world.step().map_err(|divergence| Error::invalid("settle", divergence.to_string()))?;
-        if let Some(observation) = &mut observation {
-            observation.observe(world);
-        }
-    }
-    world.settings.record_impulses = false;
-    Ok(observation.map(|o| o.errors()))
 }

@@ -1,11 +1,12 @@
 //! `simpulse profile`: the time of each phase of a step, compared with the limits of the machine.
 
 use super::output::{note, print, print_json};
-use super::settled;
 use super::values::{self, LaneArgs, SettingArgs, scene_help};
+use crate::engine::world::Settings;
 use crate::lab::error::Error;
 use crate::lab::profile::{self, profile, text};
 use crate::lab::study::open_scene;
+use crate::lab::trial::{Trial, TrialOutcome};
 use clap::Args;
 use serde_json::json;
 use std::process::ExitCode;
@@ -60,7 +61,7 @@ pub struct ProfileArgs {
 }
 
 /// Steps at the end of settling whose errors are printed.
-const OBSERVED_STEPS: u32 = 10;
+const OBSERVED_STEPS: u64 = 10;
 
 /// Longest allowed measurement (s).
 const MAX_SECONDS: f64 = 86_400.0;
@@ -77,8 +78,14 @@ pub fn run(args: &ProfileArgs) -> Result<ExitCode, Error> {
     let mut reports = Vec::new();
     for scene in &scenes {
         note(&format!("settling {}: {} steps; then {} s\n", scene.name, args.settle, args.seconds));
-        let mut world = scene.build(settings.clone())?;
-        let errors = settled(&mut world, args.settle, OBSERVED_STEPS)?;
+        let own = Settings { record_impulses: true, ..settings.clone() };
+        let (steps, measured) = (u64::from(args.settle), OBSERVED_STEPS);
+        let settled = Trial { steps, measured, ..Trial::new(scene, own) }.run(&mut |_| Ok(()))?;
+        if let Some(divergence) = settled.failure {
+            return Err(Error::invalid("settle", divergence.to_string()));
+        }
+        let TrialOutcome { mut world, errors, .. } = settled;
+        world.settings.record_impulses = false;
         let mut report = profile(&world, &scene.name, args.seconds, !args.no_ceilings)?;
         report.errors = errors;
         if args.json {

@@ -4,27 +4,25 @@ use super::output::{note, print_beside, print_json, value};
 use super::picture::{self, PictureArgs};
 use super::progress::Bar;
 use super::record::{self, RecordArgs};
+use super::sheets::Sheets;
 use super::times::Times;
 use super::values::{self, SettingArgs, scene_help};
-use crate::engine::constraints::records::rows::RowLaw;
 use crate::engine::lanes::LaneWidth;
-use crate::engine::world::{Order, Settings, SolvedBlock, World};
+use crate::engine::world::{Order, Settings, World};
 use crate::lab::error::Error;
-use crate::lab::files::{Pending, same_file};
+use crate::lab::files::same_file;
 use crate::lab::memory;
-use crate::lab::metrics::state::Angles;
-use crate::lab::metrics::{Errors, Observation};
+use crate::lab::metrics::Errors;
 use crate::lab::overrides;
-use crate::lab::report::columns;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::table::error_list;
 use crate::lab::report::units::{bodies, lanes, ratio, si};
-use crate::lab::scenes::Scene;
-use crate::lab::scenes::holds::{Broken, HoldWatch};
+use crate::lab::scenes::holds::Broken;
+use crate::lab::scenes::{Loaded, Scene};
 use crate::lab::study::{FailedAt, TruthError, budget, open_scene};
+use crate::lab::trial::{Trial, TrialOutcome};
 use clap::Args;
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -146,72 +144,37 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         }
     }
     let mut loaded = open_scene(&args.scene, args.seed, args.steps, args.dt)?;
-    let scene = &loaded.scene;
+    let rests = loaded.rests();
+    let Loaded { scene, truth, demands, unchecked, .. } = &mut loaded;
+    let scene = &*scene;
     memory::check("run", scene.bodies.len(), 0, 1)?;
-    let mut world = scene.build(settings)?;
-    note(&size_note(&world).unwrap_or_default());
-    let mut state = args.state.as_deref().map(|path| CsvFile::new(path, &columns::STATE)).transpose()?;
-    let mut contacts =
-        args.contacts.as_deref().map(|path| CsvFile::new(path, &columns::CONTACTS)).transpose()?;
-    let mut joints = args.joints.as_deref().map(|path| CsvFile::new(path, &columns::JOINTS)).transpose()?;
-
-    let mut observation = Observation::new(&world);
-    let mut watch = HoldWatch::new(&world, loaded.demands.clone());
-    let mut angles = Angles::new(&world, scene.bodies.iter().map(|b| b.angle));
+    let mut sheets = Sheets::new(args)?;
     let bar = Bar::new();
-    let diverged = |failure: FailedAt| {
+    let trial = Trial { demands: demands.clone(), truth: truth.as_mut(), ..Trial::new(scene, settings) };
+    let found = trial.run(&mut |world| {
+        if world.step_index == 0 {
+            note(&size_note(world).unwrap_or_default());
+        }
+        bar.step(world.step_index as usize, scene.steps as usize, "steps");
+        sheets.add(world, scene)
+    })?;
+    drop(bar);
+    if let Some(failure) = found.failure.map(FailedAt::from) {
         note(&format!("failed: {} {failure}; nothing written\n", args.scene));
         if args.json {
             let message = failure.to_string();
             print_json(&json!({ "scene": args.scene, "failure": value(&failure)?, "message": message }))?;
         }
-        Ok(ExitCode::FAILURE)
-    };
-    for step in 1..=scene.steps {
-        let due = args.every.map_or(step == scene.steps, |every| step % every == 0);
-        let starts: Vec<_> = match (&contacts, due) {
-            (Some(_), true) => (0..world.bodies.len()).map(|i| world.bodies.pose(i).position).collect(),
-            _ => Vec::new(),
-        };
-        if let Err(divergence) = world.step() {
-            drop(bar);
-            return diverged(divergence.into());
-        }
-        bar.step(step as usize, scene.steps as usize, "steps");
-        observation.observe(&world);
-        watch.observe(&world);
-        angles.add(&world);
-        if let Some(blow_up) = observation.blown_up() {
-            drop(bar);
-            return diverged(blow_up.into());
-        }
-        if let Some(truth) = &mut loaded.truth {
-            truth.observer.observe(&world);
-        }
-        if due && let Some(sheet) = &mut state {
-            write_state(sheet, &world, &angles, scene.dt)?;
-        }
-        if due && let Some(sheet) = &mut contacts {
-            write_contacts(sheet, &world, &starts)?;
-        }
-        if due && let Some(sheet) = &mut joints {
-            write_joints(sheet, &world)?;
-        }
+        return Ok(ExitCode::FAILURE);
     }
-    drop(bar);
     // Metrics evict the caches, so times come from separate runs. Equal bits show that these did the same
     // work.
-    let own = Settings { record_impulses: false, ..world.settings.clone() };
-    let times = Times::measure(scene, own, world.state_hash())?;
-    let truth = loaded.truth.as_ref().map(TruthError::of);
-    let (unchecked, rests) = (loaded.unchecked.clone(), loaded.rests());
-    let found =
-        RunResult { times, errors: observation.errors(), truth, broken: watch.broken(), unchecked, rests };
-    let mut written = String::new();
-    for sheet in [state, contacts, joints].into_iter().flatten() {
-        written += &format!("wrote {}\n", sheet.path.clone());
-        sheet.commit()?;
-    }
+    let own = Settings { record_impulses: false, ..found.world.settings.clone() };
+    let times = Times::measure(scene, own, found.world.state_hash())?;
+    let TrialOutcome { world, errors, truth, broken, .. } = found;
+    let errors = errors.ok_or_else(|| Error::invalid("run", "no step was measured"))?;
+    let found = RunResult { times, errors, truth, broken, unchecked: unchecked.clone(), rests };
+    let written = sheets.commit()?;
     if args.json {
         return print_json(&json(&world, scene, &found)?);
     }
@@ -414,90 +377,4 @@ fn counts(world: &World) -> String {
         c.impact_visits,
         c.cut_impacts
     )
-}
-
-/// A CSV file that appears under its name only when it is complete.
-struct CsvFile {
-    writer: csv::Writer<Pending>,
-    path: String,
-}
-
-impl CsvFile {
-    fn new(path: &Path, sheet: &columns::Sheet) -> Result<Self, Error> {
-        let path_text = path.display().to_string();
-        let mut file = CsvFile { writer: csv::Writer::from_writer(Pending::new(path)?), path: path_text };
-        file.row(sheet.names())?;
-        Ok(file)
-    }
-
-    fn row(&mut self, row: impl serde::Serialize) -> Result<(), Error> {
-        self.writer.serialize(row).map_err(|e| Error::Io { path: (&self.path).into(), source: e.into() })
-    }
-
-    fn commit(self) -> Result<(), Error> {
-        let CsvFile { writer, path } = self;
-        let pending = writer.into_inner().map_err(|e| Error::io(&path)(e.into_error()))?;
-        pending.commit()
-    }
-}
-
-/// Writes a line per body: origin, angle including whole turns since the start, velocity of the center of
-/// mass.
-fn write_state(sheet: &mut CsvFile, world: &World, angles: &Angles, dt: f64) -> Result<(), Error> {
-    let time = world.step_index as f64 * dt;
-    for i in 0..world.bodies.len() {
-        let (origin, velocity) = (world.bodies.origin(i), world.bodies.velocity(i));
-        let omega = world.bodies.angular_velocity[i];
-        let pose = (origin[0], origin[1], angles.of(i));
-        sheet.row((world.step_index, time, i, pose, velocity.x, velocity.y, omega))?;
-    }
-    Ok(())
-}
-
-/// Writes a line per contact point: geometry at the start of the step, when the centers of mass were at
-/// `starts`, and the impulses on body b over the step.
-fn write_contacts(sheet: &mut CsvFile, world: &World, starts: &[glam::Vec2]) -> Result<(), Error> {
-    for contact in &world.contacts {
-        let normal = contact.manifold.normal;
-        for (point, impulse) in contact.manifold.points().iter().zip(contact.step_impulse) {
-            let at = starts[contact.body_b as usize] + point.anchor_b;
-            let names = (world.step_index, contact.body_a, contact.body_b, point.feature_id);
-            let geometry = (at.x, at.y, normal.x, normal.y, point.separation);
-            sheet.row((names, geometry, impulse))?;
-        }
-    }
-    Ok(())
-}
-
-/// Impulse columns of a joint: rigid rows (two along lines, one of the angle), spring rows likewise, motor,
-/// two limits.
-const ROWS_OF_LINE: usize = 9;
-
-/// Writes a line per joint.
-fn write_joints(sheet: &mut CsvFile, world: &World) -> Result<(), Error> {
-    let mut lines: BTreeMap<usize, [Option<f32>; ROWS_OF_LINE]> = BTreeMap::new();
-    for SolvedBlock { joint, block, step_impulses } in world.solved_blocks() {
-        let Some(joint) = joint else { continue };
-        let impulses = lines.entry(joint.index()).or_default();
-        for (j, impulse) in block.jacobians.iter().zip(step_impulses).take(block.size) {
-            let is_angular = usize::from(j.axis == [0.0; 2]);
-            let mut place = match block.law {
-                RowLaw::Rigid => 2 * is_angular,
-                RowLaw::Spring { .. } => 3 + 2 * is_angular,
-                RowLaw::Motor { .. } => 6,
-                RowLaw::Limit => 7,
-            };
-            // The next column, for the second row along a line or for the upper limit.
-            place += usize::from(impulses[place].is_some());
-            impulses[place] = Some(impulse);
-        }
-    }
-    for (handle, joint) in world.joints() {
-        let state = world.joint_state(handle)?;
-        let impulses = lines.get(&handle.index()).copied().unwrap_or_default();
-        let names = (world.step_index, handle.index(), joint.kind.name(), joint.a.index(), joint.b.index());
-        let errors = (state.gap, state.lean, state.angle, state.translation, state.excess);
-        sheet.row((names, errors, impulses, state.load, state.breaks))?;
-    }
-    Ok(())
 }
