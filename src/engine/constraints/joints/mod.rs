@@ -13,6 +13,7 @@ use crate::clock::Phase;
 use crate::constraints::kernels::frame::{DX, DY, INV_INERTIA, INV_MASS, TURN, VX, VY, W};
 use crate::constraints::kernels::pass::{PassMode, VectorTask, at_width};
 use crate::constraints::kernels::types::{BodyStates, ConstraintType, RecordedImpulses, TypeInput, TypeRows};
+use crate::constraints::records::batches::VisitedRecord;
 use crate::constraints::records::links::{ChainLink, LinkImpulses, LinkRows, LinkRule};
 use crate::lanes::{Block, BodyRow, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowStore};
 use crate::narrowphase::lanes::PoseRow;
@@ -186,45 +187,37 @@ impl<T: JointType> Joints<T> {
     /// Adds up λ, and Jᵀ λ of each joint: the velocities that a warm start gives to resting bodies of unit
     /// mass and inertia.
     fn book<L: Lanes>(&mut self, on: TypeInput<'_>) {
-        let (first_kept, stride) = (self.first_kept(), self.stride());
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let parts = on.batches.records_with_stride::<L>(&segment, stride);
-            let indices = parts.row_a.batches::<L::Index>().zip(parts.row_b.batches::<L::Index>());
-            let indices = parts.contact.batches::<L::Index>().zip(indices).enumerate();
-            for (record, (batch, (joints, (row_a, row_b)))) in
-                parts.records.chunks_exact_mut(stride).zip(indices)
-            {
-                let [row_a, row_b] = if self.swapped { [row_b, row_a] } else { [row_a, row_b] };
-                let bodies = [on.rows.gather::<L>(row_a), on.rows.gather::<L>(row_b)].map(|mut row| {
-                    [VX, VY, W].into_iter().for_each(|k| row[k] = L::zero());
-                    [INV_MASS, INV_INERTIA].into_iter().for_each(|k| row[k] = L::splat(1.0));
-                    row
-                });
-                let (numbers, kept) = record.split_at_mut(first_kept);
-                let (anchors, numbers) = numbers.split_at(ANCHORS);
-                for (lane, &joint) in joints.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate() {
-                    let sums = &mut self.summed[joint as usize * kept.len()..][..kept.len()];
-                    let of_lane = bytemuck::cast_slice::<L, f32>(kept).chunks_exact(L::WIDTH);
-                    sums.iter_mut().zip(of_lane).for_each(|(sum, kept)| *sum += kept[lane]);
-                }
-                for driving in [false, true] {
-                    let mut pass = JointWarmStart { pair: JointPair::new(bodies, anchors), driving };
-                    rows_once::<T, L>(self.form, numbers, kept, &mut pass);
-                    for (lane, &joint) in
-                        joints.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate()
-                    {
-                        let booked = &mut self.booked[joint as usize];
-                        let sums = if driving { &mut booked.driving } else { &mut booked.all };
-                        for (sum, body) in sums.iter_mut().zip(&pass.pair.bodies) {
-                            for (sum, k) in sum.iter_mut().zip([VX, VY, W]) {
-                                *sum += bytemuck::cast_slice::<L, f32>(&body[k..=k])[lane];
-                            }
+        let (first_kept, stride, rows) = (self.first_kept(), self.stride(), &on.rows);
+        on.batches.for_each_record::<L>(stride, |at| {
+            let at = at.with_ends(self.swapped);
+            let bodies = at.rows.map(|row| {
+                let mut row = rows.gather::<L>(row);
+                [VX, VY, W].into_iter().for_each(|k| row[k] = L::zero());
+                [INV_MASS, INV_INERTIA].into_iter().for_each(|k| row[k] = L::splat(1.0));
+                row
+            });
+            let joints = &at.names.entries()[..at.filled];
+            let (numbers, kept) = at.record.split_at_mut(first_kept);
+            let (anchors, numbers) = numbers.split_at(ANCHORS);
+            for (lane, &joint) in joints.iter().enumerate() {
+                let sums = &mut self.summed[joint as usize * kept.len()..][..kept.len()];
+                let of_lane = bytemuck::cast_slice::<L, f32>(kept).chunks_exact(L::WIDTH);
+                sums.iter_mut().zip(of_lane).for_each(|(sum, kept)| *sum += kept[lane]);
+            }
+            for driving in [false, true] {
+                let mut pass = JointWarmStart { pair: JointPair::new(bodies, anchors), driving };
+                rows_once::<T, L>(self.form, numbers, kept, &mut pass);
+                for (lane, &joint) in joints.iter().enumerate() {
+                    let booked = &mut self.booked[joint as usize];
+                    let sums = if driving { &mut booked.driving } else { &mut booked.all };
+                    for (sum, body) in sums.iter_mut().zip(&pass.pair.bodies) {
+                        for (sum, k) in sum.iter_mut().zip([VX, VY, W]) {
+                            *sum += bytemuck::cast_slice::<L, f32>(&body[k..=k])[lane];
                         }
                     }
                 }
             }
-        }
+        });
     }
 
     /// A pass that transfers between impulses and vectors.
@@ -232,32 +225,23 @@ impl<T: JointType> Joints<T> {
         let (first_kept, stride, kept) = (self.first_kept(), self.stride(), T::kept(self.form));
         let (law, inv_h, pushes) = (on.law, 1.0 / on.h, matches!(of, VectorTask::Push));
         let [x, y] = on.vectors.map(|blocks| bytemuck::cast_slice_mut::<Block, L>(blocks));
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let pushed = if self.swapped { [true, segment.pushes_a()] } else { [segment.pushes_a(), true] };
-            let parts = on.batches.records_with_stride::<L>(&segment, stride);
-            let [rows_a, rows_b] =
-                if self.swapped { [parts.row_b, parts.row_a] } else { [parts.row_a, parts.row_b] };
-            let indices = rows_a.batches::<L::Index>().zip(rows_b.batches::<L::Index>());
-            let mut slot = segment.first_slot;
-            for (record, (row_a, row_b)) in parts.records.chunks_exact_mut(stride).zip(indices) {
-                let bodies = [on.rows.gather::<L>(row_a), on.rows.gather::<L>(row_b)];
-                let (numbers, impulses) = record.split_at_mut(first_kept);
-                let (anchors, numbers) = numbers.split_at(ANCHORS);
-                // A row has two blocks, the second of which is zero.
-                let per_block = 16 / L::WIDTH;
-                let first = 2 * kept * (slot / 16) * per_block + slot % 16 / L::WIDTH;
-                let places = Places { first, stride: 2 * per_block, next: 0 };
-                let pair = JointPair::new(bodies, anchors);
-                let mut pass = Vectors { pair, of, law, inv_h, vectors: [&mut *x, &mut *y], places };
-                rows_once::<T, L>(self.form, numbers, impulses, &mut pass);
-                slot += L::WIDTH;
-                let bodies = pass.pair.bodies;
-                if pushes {
-                    write_velocities(&mut on.rows, [row_a, row_b], pushed, bodies);
-                }
+        on.batches.for_each_record::<L>(stride, |at| {
+            let VisitedRecord { record, rows, pushes: pushed, slot, .. } = at.with_ends(self.swapped);
+            let bodies = rows.map(|row| on.rows.gather::<L>(row));
+            let (numbers, impulses) = record.split_at_mut(first_kept);
+            let (anchors, numbers) = numbers.split_at(ANCHORS);
+            // A row has two blocks, the second of which is zero.
+            let per_block = 16 / L::WIDTH;
+            let first = 2 * kept * (slot / 16) * per_block + slot % 16 / L::WIDTH;
+            let places = Places { first, stride: 2 * per_block, next: 0 };
+            let pair = JointPair::new(bodies, anchors);
+            let mut pass = Vectors { pair, of, law, inv_h, vectors: [&mut *x, &mut *y], places };
+            rows_once::<T, L>(self.form, numbers, impulses, &mut pass);
+            let bodies = pass.pair.bodies;
+            if pushes {
+                write_velocities(&mut on.rows, rows, pushed, bodies);
             }
-        }
+        });
     }
 
     fn warm_start<L: Lanes>(&self, on: TypeInput<'_>) {
@@ -294,32 +278,24 @@ impl<T: JointType> Joints<T> {
         of: impl Fn(JointPair<L>) -> P,
     ) {
         let (first_kept, stride) = (self.first_kept(), self.stride());
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let pushes = if self.swapped { [true, segment.pushes_a()] } else { [segment.pushes_a(), true] };
-            let parts = on.batches.records_with_stride::<L>(&segment, stride);
-            let [rows_a, rows_b] =
-                if self.swapped { [parts.row_b, parts.row_a] } else { [parts.row_a, parts.row_b] };
-            let indices = rows_a.batches::<L::Index>().zip(rows_b.batches::<L::Index>());
-            for (record, (row_a, row_b)) in parts.records.chunks_exact_mut(stride).zip(indices) {
-                let bodies = [on.rows.gather::<L>(row_a), on.rows.gather::<L>(row_b)];
-                let (numbers, kept) = record.split_at_mut(first_kept);
-                let (anchors, numbers) = numbers.split_at(ANCHORS);
-                let mut pass = of(JointPair::new(bodies, anchors));
-                T::rows(self.form, numbers, kept, &mut pass);
-                let [a, b] = pass.bodies;
-                if moves {
-                    if pushes[1] {
-                        on.rows.scatter_delta::<L>(row_b, [b[DX], b[DY], b[TURN], b[INV_INERTIA]]);
-                    }
-                    if pushes[0] {
-                        on.rows.scatter_delta::<L>(row_a, [a[DX], a[DY], a[TURN], a[INV_INERTIA]]);
-                    }
-                    continue;
-                }
-                write_velocities(&mut on.rows, [row_a, row_b], pushes, [a, b]);
+        on.batches.for_each_record::<L>(stride, |at| {
+            let VisitedRecord { record, rows, pushes, .. } = at.with_ends(self.swapped);
+            let bodies = rows.map(|row| on.rows.gather::<L>(row));
+            let (numbers, kept) = record.split_at_mut(first_kept);
+            let (anchors, numbers) = numbers.split_at(ANCHORS);
+            let mut pass = of(JointPair::new(bodies, anchors));
+            T::rows(self.form, numbers, kept, &mut pass);
+            let ([row_a, row_b], [a, b]) = (rows, pass.bodies);
+            if !moves {
+                return write_velocities(&mut on.rows, rows, pushes, [a, b]);
             }
-        }
+            if pushes[1] {
+                on.rows.scatter_delta::<L>(row_b, [b[DX], b[DY], b[TURN], b[INV_INERTIA]]);
+            }
+            if pushes[0] {
+                on.rows.scatter_delta::<L>(row_a, [a[DX], a[DY], a[TURN], a[INV_INERTIA]]);
+            }
+        });
     }
 }
 
@@ -370,71 +346,47 @@ impl JointNumbers<'_> {
 
     fn fill<L: Lanes>(self, on: TypeInput<'_>) {
         let ([numbers, kept], stride) = (self.counts, self.stride());
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let parts = on.batches.records_with_stride::<L>(&segment, stride);
-            let indices = parts.row_a.batches::<L::Index>().zip(parts.row_b.batches::<L::Index>());
-            let indices = parts.contact.batches::<L::Index>().zip(indices).enumerate();
-            for (record, (batch, (joints, (row_a, row_b)))) in
-                parts.records.chunks_exact_mut(stride).zip(indices)
-            {
-                let filled = segment.filled(batch, L::WIDTH);
-                let (a, b) = if self.swapped { (row_b, row_a) } else { (row_a, row_b) };
-                record[..ANCHORS].copy_from_slice(&placed_anchors::<L>(
-                    self.anchors,
-                    on.poses,
-                    joints,
-                    [a, b],
-                ));
-                let floats: &mut [f32] = bytemuck::cast_slice_mut(record);
-                if filled < L::WIDTH {
-                    // Padding lanes are zero.
-                    floats.chunks_exact_mut(L::WIDTH).for_each(|lanes| lanes[filled..].fill(0.0));
-                    floats[ANCHORS * L::WIDTH..].fill(0.0);
-                }
-                for (lane, &joint) in joints.entries()[..filled].iter().enumerate() {
-                    let joint = joint as usize;
-                    let values = self.numbers[joint * numbers..][..numbers].iter();
-                    let values = values.chain(&self.kept[joint * kept..][..kept]);
-                    for (to, &value) in floats[ANCHORS * L::WIDTH..].chunks_exact_mut(L::WIDTH).zip(values) {
-                        to[lane] = value;
-                    }
+        on.batches.for_each_record::<L>(stride, |at| {
+            let VisitedRecord { record, names: joints, filled, rows, .. } = at.with_ends(self.swapped);
+            record[..ANCHORS].copy_from_slice(&placed_anchors::<L>(self.anchors, on.poses, joints, rows));
+            let floats: &mut [f32] = bytemuck::cast_slice_mut(record);
+            if filled < L::WIDTH {
+                // Padding lanes are zero.
+                floats.chunks_exact_mut(L::WIDTH).for_each(|lanes| lanes[filled..].fill(0.0));
+                floats[ANCHORS * L::WIDTH..].fill(0.0);
+            }
+            for (lane, &joint) in joints.entries()[..filled].iter().enumerate() {
+                let joint = joint as usize;
+                let values = self.numbers[joint * numbers..][..numbers].iter();
+                let values = values.chain(&self.kept[joint * kept..][..kept]);
+                for (to, &value) in floats[ANCHORS * L::WIDTH..].chunks_exact_mut(L::WIDTH).zip(values) {
+                    to[lane] = value;
                 }
             }
-        }
+        });
     }
 
     /// Writes the kept numbers of records back, except the impulses of links, which `keep_links` sets.
     fn store<L: Lanes>(self, on: TypeInput<'_>) {
         let (numbers, kept, stride) = (self.first_kept(), self.counts[1], self.stride());
         let of_links = if self.linked.is_active() { self.rigid } else { None };
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let parts = on.batches.records_with_stride::<L>(&segment, stride);
-            let lists = parts.contact.batches::<L::Index>();
-            for (batch, (record, joints)) in parts.records.chunks_exact_mut(stride).zip(lists).enumerate() {
-                let floats: &[f32] = bytemuck::cast_slice(&record[numbers..]);
-                let filled = segment.filled(batch, L::WIDTH);
-                for (lane, &joint) in joints.entries()[..filled].iter().enumerate() {
-                    let [place, rows] = of_links.filter(|_| self.linked.has(joint)).unwrap_or_default();
-                    let values = self.kept[joint as usize * kept..][..kept].iter_mut().enumerate();
-                    for ((i, value), from) in values.zip(floats.chunks_exact(L::WIDTH)) {
-                        if !(place..place + rows).contains(&i) {
-                            *value = from[lane];
-                        }
+        on.batches.for_each_record::<L>(stride, |at| {
+            let floats: &[f32] = bytemuck::cast_slice(&at.record[numbers..]);
+            for (lane, &joint) in at.names.entries()[..at.filled].iter().enumerate() {
+                let [place, rows] = of_links.filter(|_| self.linked.has(joint)).unwrap_or_default();
+                let values = self.kept[joint as usize * kept..][..kept].iter_mut().enumerate();
+                for ((i, value), from) in values.zip(floats.chunks_exact(L::WIDTH)) {
+                    if !(place..place + rows).contains(&i) {
+                        *value = from[lane];
                     }
                 }
             }
-        }
+        });
     }
 
     fn forget<L: Lanes>(self, on: TypeInput<'_>) {
-        let (numbers, stride) = (self.first_kept(), self.stride());
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let parts = on.batches.records_with_stride::<L>(&segment, stride);
-            parts.records.chunks_exact_mut(stride).for_each(|record| record[numbers..].fill(L::zero()));
-        }
+        let numbers = self.first_kept();
+        on.batches.for_each_record::<L>(self.stride(), |at| at.record[numbers..].fill(L::zero()));
     }
 }
 

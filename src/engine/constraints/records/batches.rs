@@ -3,7 +3,7 @@
 use crate::constraints::records::features::{Features, Layout, LayoutOf, OppositeKind};
 use crate::constraints::records::order::SweepOrder;
 pub use crate::constraints::records::segment::Segment;
-use crate::lanes::{Block, IndexList, Indices, Lanes};
+use crate::lanes::{Block, IndexList, Indices, LaneIndex, Lanes};
 use std::ops::Range;
 
 /// Attributes of a new [`Segment`] besides its records.
@@ -48,6 +48,34 @@ pub struct SegmentRecords<'a, L> {
     pub row_a: IndexList<'a>,
     /// `[batches × width]`
     pub row_b: IndexList<'a>,
+}
+
+/// A record of constraints of any type.
+pub(crate) struct VisitedRecord<'a, L: Lanes> {
+    /// `[stride]`
+    pub record: &'a mut [L],
+    /// The constraint in each lane.
+    pub names: LaneIndex<'a, L::Index>,
+    /// Number of lanes that hold a constraint.
+    pub filled: usize,
+    /// Rows of bodies a and b.
+    pub rows: [LaneIndex<'a, L::Index>; 2],
+    /// Whether impulses push bodies a and b.
+    pub pushes: [bool; 2],
+    /// Slot of the first lane in vectors over constraints.
+    pub slot: usize,
+}
+
+impl<L: Lanes> VisitedRecord<'_, L> {
+    /// The record with bodies a and b exchanged if `swapped`.
+    #[inline(always)]
+    pub fn with_ends(mut self, swapped: bool) -> Self {
+        if swapped {
+            self.rows.reverse();
+            self.pushes.reverse();
+        }
+        self
+    }
 }
 
 /// The two sets of batches in a step.
@@ -319,6 +347,30 @@ impl Batches {
             contact: self.contact.list().part(lanes.clone()),
             row_a: self.row_a.list().part(lanes.clone()),
             row_b: self.row_b.list().part(lanes),
+        }
+    }
+
+    /// Calls `visit` for every record of `stride` lane vectors, in the order of the visits.
+    ///
+    /// # Panics
+    /// As [`Self::records_of`].
+    #[inline(always)]
+    pub(crate) fn for_each_record<L: Lanes>(
+        &mut self,
+        stride: usize,
+        mut visit: impl FnMut(VisitedRecord<'_, L>),
+    ) {
+        for i in self.focus.clone() {
+            let segment = self.visits[i];
+            let parts = self.records_with_stride::<L>(&segment, stride);
+            let rows = parts.row_a.batches::<L::Index>().zip(parts.row_b.batches::<L::Index>());
+            let lists = parts.contact.batches::<L::Index>().zip(rows).enumerate();
+            for (record, (batch, (names, (a, b)))) in parts.records.chunks_exact_mut(stride).zip(lists) {
+                let slot = segment.first_slot + batch * L::WIDTH;
+                let filled = segment.filled(batch, L::WIDTH);
+                let pushes = [segment.pushes_a(), true];
+                visit(VisitedRecord { record, names, filled, rows: [a, b], pushes, slot });
+            }
         }
     }
 

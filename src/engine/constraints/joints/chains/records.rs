@@ -5,6 +5,7 @@ use crate::constraints::joints::rows::{Jacobian, JointPair, JointPass, RowLaw};
 use crate::constraints::joints::{ANCHORS, JointType, Joints, placed_anchors, write_velocities};
 use crate::constraints::kernels::frame::{INV_INERTIA, INV_MASS};
 use crate::constraints::kernels::types::{ConstraintType, TypeInput};
+use crate::constraints::records::batches::VisitedRecord;
 use crate::constraints::records::links::{ChainLink, LINK_LANES, LinkImpulses, LinkRows, LinkRule};
 use crate::lanes::{BodyRow, Indices, LaneIndex, Lanes, RowStore};
 use crate::narrowphase::lanes::PoseRow;
@@ -142,57 +143,41 @@ impl<T: JointType> Joints<T> {
             return;
         }
         let rigid_alone = self.rigid_alone();
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let pushes = if self.swapped { [true, segment.pushes_a()] } else { [segment.pushes_a(), true] };
-            let parts = on.batches.records_with_stride::<L>(&segment, stride);
-            let [rows_a, rows_b] =
-                if self.swapped { [parts.row_b, parts.row_a] } else { [parts.row_a, parts.row_b] };
-            let indices = rows_a.batches::<L::Index>().zip(rows_b.batches::<L::Index>());
-            let indices = parts.contact.batches::<L::Index>().zip(indices).enumerate();
-            for (record, (batch, (joints, (row_a, row_b)))) in
-                parts.records.chunks_exact_mut(stride).zip(indices)
-            {
-                let joints = &joints.entries()[..segment.filled(batch, L::WIDTH)];
-                if rigid_alone && joints.iter().all(|&joint| self.linked.has(joint)) {
-                    continue;
-                }
-                let mut taken = [L::splat(1.0)];
-                let lanes: &mut [f32] = bytemuck::cast_slice_mut(&mut taken);
-                for (lane, &joint) in lanes.iter_mut().zip(joints) {
-                    *lane = if self.linked.has(joint) { 0.0 } else { 1.0 };
-                }
-                let bodies = [on.rows.gather::<L>(row_a), on.rows.gather::<L>(row_b)];
-                let (numbers, kept) = record.split_at_mut(first_kept);
-                let (anchors, numbers) = numbers.split_at(ANCHORS);
-                let mut pass = Besides { of: of(JointPair::new(bodies, anchors)), taken: taken[0] };
-                T::rows(self.form, numbers, kept, &mut pass);
-                write_velocities(&mut on.rows, [row_a, row_b], pushes, pass.bodies);
+        on.batches.for_each_record::<L>(stride, |at| {
+            let joints = &at.names.entries()[..at.filled];
+            if rigid_alone && joints.iter().all(|&joint| self.linked.has(joint)) {
+                return;
             }
-        }
+            let mut taken = [L::splat(1.0)];
+            let lanes: &mut [f32] = bytemuck::cast_slice_mut(&mut taken);
+            for (lane, &joint) in lanes.iter_mut().zip(joints) {
+                *lane = if self.linked.has(joint) { 0.0 } else { 1.0 };
+            }
+            let VisitedRecord { record, rows, pushes, .. } = at.with_ends(self.swapped);
+            let bodies = rows.map(|row| on.rows.gather::<L>(row));
+            let (numbers, kept) = record.split_at_mut(first_kept);
+            let (anchors, numbers) = numbers.split_at(ANCHORS);
+            let mut pass = Besides { of: of(JointPair::new(bodies, anchors)), taken: taken[0] };
+            T::rows(self.form, numbers, kept, &mut pass);
+            write_velocities(&mut on.rows, rows, pushes, pass.bodies);
+        });
     }
 
     /// Copies the impulses of the rigid rows of links to the records.
     pub(crate) fn load_direct_impulses<L: Lanes>(&self, on: TypeInput<'_>) {
         let Some([place, rows]) = self.rigid.filter(|_| self.linked.is_active()) else { return };
         let (first, stride, kept) = (self.first_kept() + place, self.stride(), T::kept(self.form));
-        for i in 0..on.batches.visits().len() {
-            let segment = on.batches.visits()[i];
-            let parts = on.batches.records_with_stride::<L>(&segment, stride);
-            let lists = parts.contact.batches::<L::Index>();
-            for (batch, (record, joints)) in parts.records.chunks_exact_mut(stride).zip(lists).enumerate() {
-                let floats: &mut [f32] = bytemuck::cast_slice_mut(&mut record[first..][..rows]);
-                for (lane, &joint) in joints.entries()[..segment.filled(batch, L::WIDTH)].iter().enumerate() {
-                    let joint = joint as usize;
-                    if self.linked.has(joint as u32) {
-                        let values = &self.kept[joint * kept + place..][..rows];
-                        for (to, &value) in floats.chunks_exact_mut(L::WIDTH).zip(values) {
-                            to[lane] = value;
-                        }
+        on.batches.for_each_record::<L>(stride, |at| {
+            let floats: &mut [f32] = bytemuck::cast_slice_mut(&mut at.record[first..][..rows]);
+            for (lane, &joint) in at.names.entries()[..at.filled].iter().enumerate() {
+                if self.linked.has(joint) {
+                    let values = &self.kept[joint as usize * kept + place..][..rows];
+                    for (to, &value) in floats.chunks_exact_mut(L::WIDTH).zip(values) {
+                        to[lane] = value;
                     }
                 }
             }
-        }
+        });
     }
 
     /// Sets the impulses of the links.
