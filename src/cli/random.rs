@@ -6,7 +6,7 @@ use super::verify::VerifyArgs;
 use crate::engine::solvers::{DEFAULT, Variant, find};
 use crate::engine::world::Settings;
 use crate::lab::error::Error;
-use crate::lab::files::Pending;
+use crate::lab::files;
 use crate::lab::report::environment::Environment;
 use crate::lab::torture::families::{FAMILIES, Family};
 use crate::lab::torture::minimize::minimize;
@@ -16,7 +16,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde_json::json;
 use std::collections::HashSet;
-use std::fs::{File, OpenOptions, create_dir_all, read_to_string};
+use std::fs::{File, OpenOptions, read_to_string};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -135,7 +135,7 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
     let own = &args.random;
     let names: Vec<String> = solvers.iter().map(|v| args.name(v)).collect();
     if let Some(folder) = &own.keep {
-        create_dir_all(folder).map_err(Error::io(folder))?;
+        files::prepare_folder(folder)?;
     }
     let scenes = args.scenes();
     let wanted: HashSet<(&str, u32)> = scenes.iter().map(|(f, n)| (f.name, *n)).collect();
@@ -249,9 +249,7 @@ fn one(
         least.scene.name = format!("{}, {verdict} under {name}", least.scene.name);
         let path =
             folder.join(format!("{}_{number}_{}_{name}_{verdict}.json", family.name, args.random.seed));
-        let mut file = Pending::new(&path)?;
-        file.write_all(least.scene.to_json().as_bytes()).map_err(Error::io(&path))?;
-        file.commit()?;
+        files::write(&path, least.scene.to_json().as_bytes())?;
     }
     let (family, solver) = (family.name.to_string(), args.name(solver));
     Ok(TortureRow { seed: args.random.seed, family, number, solver, outcome })

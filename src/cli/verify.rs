@@ -98,7 +98,7 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
     }
     let note = values::left_out(&solvers);
     let bar = Bar::new();
-    let tell = |p: verify::CaseProgress| bar.show(p.done, p.total, p.what);
+    let tell = |done, total, what: &str| bar.show(done, total, what);
     let without = solvers
         .iter()
         .map(|v| Ok((v.name, args.without.of(v)?)))
@@ -435,7 +435,7 @@ mod tests {
     #[test]
     fn json_holds_every_cell() {
         let cases = verify::select(&["A0".to_string(), "B2.box".to_string()]).unwrap();
-        let matrix = verify::run(cases, VARIANTS.to_vec(), 1, Lab::new, &|_| ());
+        let matrix = verify::run(cases, VARIANTS.to_vec(), 1, Lab::new, &|_, _, _| ());
         let value = json(&matrix, Impacts::Own);
         assert_eq!(value["results"].as_array().unwrap().len(), 2 * VARIANTS.len());
         assert_eq!(value["broken_promises"], json!([]));

@@ -33,7 +33,7 @@ pub fn run(
 ) -> Vec<Ablated> {
     let total = solver.mechanisms.len() + 1;
     let passed = |without: Without, done: usize, name: &str| -> Vec<Option<bool>> {
-        let tell = |p: verify::CaseProgress| tell(done, total, &format!("{name}: {}", p.what));
+        let tell = |_, _, what: &str| tell(done, total, &format!("{name}: {what}"));
         let lab = |solver| lab(solver).without(without);
         let found = verify::run(cases.to_vec(), vec![solver], threads, lab, &tell);
         found.cells.iter().map(|cells| cells[0].passed()).collect()

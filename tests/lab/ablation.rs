@@ -46,7 +46,7 @@ fn every_mechanism_has_a_case_that_fails_without_it() {
                 let cases = verify::select(&[mechanism.case.to_string()]).unwrap();
                 let passed = |without| {
                     let lab = |v| Lab::new(v).without(without);
-                    let found = verify::run(cases.clone(), vec![variant], 1, lab, &|_| ());
+                    let found = verify::run(cases.clone(), vec![variant], 1, lab, &|_, _, _| ());
                     found.cells[0][0].passed()
                 };
                 assert_eq!(passed(Without::default()), Some(true), "{name}: {}", mechanism.case);

@@ -1,7 +1,6 @@
 //! Laws of whole scenes and of the laboratory, one file per law.
 
 mod ablation;
-mod advise;
 mod agree;
 mod broadphase;
 mod common;

@@ -19,7 +19,7 @@ fn run(
 ) -> VerifyMatrix {
     let ids: Vec<String> = ids.iter().map(|id| id.to_string()).collect();
     let cases = if ids.is_empty() { Vec::new() } else { verify::select(&ids).unwrap() };
-    verify::run(cases, solvers.to_vec(), threads, lab, &|_| ())
+    verify::run(cases, solvers.to_vec(), threads, lab, &|_, _, _| ())
 }
 
 fn failed(matrix: &VerifyMatrix) -> Vec<&'static str> {
@@ -73,7 +73,7 @@ fn fails_under(solver: &str, change: fn(&mut Scene), ids: &[&str]) {
     let right = run(ids, &[solvers::find(solver).unwrap()], 2, lab);
     assert_eq!(failed(&right), [""; 0], "must pass unchanged");
     let cases = right.cases.clone();
-    let wrong = verify::run(cases, right.solvers.clone(), 2, |solver| lab(solver).changing(change), &|_| ());
+    let wrong = verify::run(cases, right.solvers.clone(), 2, |solver| lab(solver).changing(change), &|_, _, _| ());
     let passing: Vec<_> = ids.iter().filter(|id| !failed(&wrong).contains(id)).collect();
     assert!(passing.is_empty(), "pass in wrong physics: {passing:?}");
 }
@@ -200,7 +200,7 @@ fn a_diverged_run_fails_with_step_body_and_speed() {
         vec![solvers::find("pgs").unwrap()],
         1,
         |solver| Lab::new(solver).changing(wild),
-        &|_| (),
+        &|_, _, _| (),
     );
     let Cell::Failed(failure) = &matrix.cells[0][0] else { panic!("{:?}", matrix.cells) };
     let text = failure.to_string();
@@ -235,6 +235,6 @@ const FAILS: &[&str] = &[];
 #[test]
 fn the_default_solver_keeps_its_promises_but_for_those_that_are_told() {
     let cases: Vec<&Case> = CASES.iter().copied().filter(|case| case.required.is_required()).collect();
-    let matrix = verify::run(cases, vec![solvers::find(DEFAULT).unwrap()], 2, Lab::new, &|_| ());
+    let matrix = verify::run(cases, vec![solvers::find(DEFAULT).unwrap()], 2, Lab::new, &|_, _, _| ());
     assert_eq!(matrix.broken_promises(DEFAULT), Some(FAILS.to_vec()));
 }

@@ -35,7 +35,7 @@ use crate::lab::error::Error;
 use crate::lab::overrides::{self, Override};
 use crate::lab::reference::certify::{Certificate, Reference};
 use crate::lab::reference::iterate::{Iteration, Stop, gauss_seidel_rate, iterate, rate_at};
-use crate::lab::reference::residual::{contact_residuals, joint_residuals, largest, natural_map};
+use crate::lab::reference::residual::{LawMeasure, natural_map};
 use crate::lab::reference::{ContactProblem, Target};
 use replay::{Replay, Replayed, Sequence, Start};
 use serde::Serialize;
@@ -333,10 +333,8 @@ fn measure(
     let rigid = natural_map(problem, Target::Rigid, velocities, impulses) / unit;
     let mut own_is_rigid = true;
     let own = outcome.own.as_ref().map(|own| {
-        let target = Target::Own(&own.rows);
-        let contacts = contact_residuals(problem, target, velocities, impulses);
-        let contacts = contacts.iter().flat_map(|r| [r[0], if own.friction { r[1] } else { 0.0 }]);
-        let parts = contacts.chain(joint_residuals(problem, target, velocities, impulses));
+        let mut law = LawMeasure::new(problem, Target::Own(&own.rows));
+        law.friction = own.friction;
         let has_friction = problem.contacts.iter().any(|c| c.friction > 0.0);
         own_is_rigid = own.friction || !has_friction;
         let contacts = (0..problem.contacts.len()).map(|i| Target::Rigid.row(problem, i));
@@ -345,9 +343,9 @@ fn measure(
             let rounding = 1e-6 * (1.0 + rigid.bias.abs());
             own_is_rigid &= (row.bias - rigid.bias).abs() <= rounding && row.compliance == 0.0;
         }
-        largest(parts) / unit
+        law.natural_map(velocities, impulses) / unit
     });
-    let velocity_error = reference.map(|r| r.compare(problem, velocities, impulses).velocity);
+    let velocity_error = reference.map(|r| problem.velocity_error(velocities, &r.velocities));
     (CurvePoint { iterations, sweeps: outcome.sweeps, rigid, own, velocity_error }, own_is_rigid)
 }
 

@@ -15,7 +15,7 @@ use glam::Vec2;
 pub(super) fn bodies(problem: &ContactProblem, pushed: bool) -> Bodies {
     let mut bodies = Bodies::default();
     for b in &problem.bodies {
-        let moves = b.inv_mass > 0.0 || b.inv_inertia > 0.0;
+        let moves = b.moves();
         let [vx, vy, w] = if pushed { b.velocity } else { b.free_velocity };
         let def = BodyDef {
             kind: if moves { BodyKind::Dynamic } else { BodyKind::Kinematic },
@@ -56,7 +56,7 @@ pub(super) fn contacts(problem: &ContactProblem, inert: u32) -> (Vec<Contact>, V
     let dynamic = |body: Option<u32>| {
         body.is_some_and(|b| {
             let b = &problem.bodies[b as usize];
-            b.inv_mass > 0.0 || b.inv_inertia > 0.0
+            b.moves()
         })
     };
     let (mut contacts, mut places) = (Vec::new(), Vec::new());

@@ -237,6 +237,12 @@ pub fn weight(bodies: &[BodyState]) -> f64 {
     bodies.iter().filter(|b| b.inv_mass > 0.0).map(|b| b.force.length()).sum()
 }
 
+/// The weight of the lighter one (N) of two bodies; `None` if no dynamic one has any.
+pub(super) fn lighter_weight(pair: [&BodyState; 2]) -> Option<f64> {
+    let weights = pair.into_iter().filter(|b| b.inv_mass > 0.0).map(|b| b.force.length());
+    weights.filter(|&weight| weight > 0.0).min_by(f64::total_cmp)
+}
+
 /// value / scale, or zero if the scale is zero.
 pub(super) fn ratio(value: f64, scale: f64) -> f64 {
     if scale > 0.0 { value / scale } else { 0.0 }

@@ -17,9 +17,9 @@
 //! A spring's force changes from substep to substep, so its law is evaluated in the last one (λ_n), with the
 //! error at its start. Angular rows are converted to N·s as in that module.
 
+use super::balance::{lighter_weight, ratio};
 use super::distribution::Sum;
 use super::law::BodyStep;
-use super::ratio;
 use crate::engine::bodies::BodyKind;
 use crate::engine::world::{SolvedBlock, World};
 use crate::lab::reference::BlockLaw;
@@ -144,13 +144,11 @@ impl JointErrors {
     fn add_block(&mut self, solved: &SolvedBlock, bodies: &[BodyStep], dt: f64, substeps: f64) {
         let ends = solved.block.bodies.map(|body| &bodies[body as usize]);
         let block = JointBlock::new(solved, ends);
-        let weights = ends.map(|body| (body.before.inv_mass > 0.0, body.before.force.length()));
-        let lighter =
-            weights.into_iter().filter(|w| w.0 && w.1 > 0.0).map(|w| w.1).fold(f64::INFINITY, f64::min);
+        let lighter = lighter_weight(ends.map(|body| &body.before));
         for (i, residual) in block.residuals(dt, substeps).into_iter().take(solved.block.size).enumerate() {
             self.residual.add(residual);
             self.largest_impulse = self.largest_impulse.max((block.scale[i] * block.impulses[i]).abs());
-            if lighter.is_finite() {
+            if let Some(lighter) = lighter {
                 self.lighter.add(residual / (lighter * dt));
             }
         }

@@ -15,7 +15,6 @@
 //! | energy | energy gained or lost, and where it went | [`balance`], [`state`] |
 //! | rest velocity, creep, settle time | whether bodies that should rest do | [`rest`] |
 //! | gap, lean, excess, residual, work of joints | how well joints hold, and their work | [`mod@joints`] |
-//! | velocity error | how far velocities are from a reference | [`velocity`] |
 //!
 //! A run that blows up ([`Observation::blown_up`]) has failed, and has no errors.
 //!
@@ -52,14 +51,13 @@ pub mod rest;
 pub mod softness;
 pub mod state;
 pub mod table;
-pub mod velocity;
 pub mod violation;
 
 use crate::engine::bodies::BodyKind;
 use crate::engine::contacts::{Contact, pair_key};
 use crate::engine::params::RESTITUTION_THRESHOLD;
 use crate::engine::world::{Criterion, Divergence, Quantity, World};
-use balance::{Balance, ratio, weight};
+use balance::{Balance, lighter_weight, ratio, weight};
 use distribution::{Distribution, Sum};
 use glam::{DVec2, Vec2};
 use joints::{Given, JointErrors};
@@ -185,10 +183,7 @@ impl Observation {
             let [normal, tangent] = point.residual(&bodies[*a], &bodies[*b], self.dt);
             self.normal.add(normal);
             self.tangent.add(tangent);
-            let weights = [a, b].map(|i| self.previous[*i]).map(|s| (s.inv_mass > 0.0, s.force.length()));
-            let lighter = weights.into_iter().filter(|w| w.0 && w.1 > 0.0).map(|w| w.1);
-            let lighter = lighter.fold(f64::INFINITY, f64::min);
-            if lighter.is_finite() {
+            if let Some(lighter) = lighter_weight([a, b].map(|i| &self.previous[*i])) {
                 self.lighter.add(normal.hypot(tangent) / (lighter * self.dt));
             }
             self.violation = self.violation.max(point.violation(&bodies[*a], &bodies[*b], self.dt));

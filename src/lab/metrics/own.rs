@@ -14,10 +14,11 @@
 //! Not measured: steps in which a contact may bounce, since bounces come after the last sweep, and solvers that do
 //! not end with a velocity sweep.
 
-use super::law::{BodyStep, PointStep, natural_map, tangent};
+use super::law::{BodyStep, PointStep, tangent};
 use crate::engine::bodies::BodyKind;
 use crate::engine::constraints::kernels::observe::{NormalLaw, ObservedRule};
 use crate::engine::world::World;
+use crate::lab::reference::residual::law_residual;
 
 /// Bias of a row that the rule does not solve (m/s): no body is this fast, so its impulse must be zero.
 const OUT_OF_REACH: f64 = 1e30;
@@ -30,7 +31,7 @@ impl PointStep {
             [self.normal, tangent(self.normal)].map(|axis| self.effective_mass(axis, &a.before, &b.before));
         let un = vn + law.bias + law.compliance * self.impulse[0];
         let rho = [mass_n / (1.0 + mass_n * law.compliance), mass_t];
-        let [normal, tangent] = natural_map(self.impulse, [un, vt], rho, self.friction);
+        let [normal, tangent] = law_residual(self.friction, [un, vt], self.impulse, rho);
         // A sweep without friction rows has no target along the tangent.
         [normal, if friction { tangent } else { 0.0 }]
     }

@@ -46,9 +46,9 @@ use std::fs;
 use std::path::Path;
 
 /// Value of `format` in the header.
-pub const FORMAT: &str = "simpulse-frozen";
+const FORMAT: &str = "simpulse-frozen";
 /// Newest version that this crate reads, used for problems with joints. Others have version 1.
-pub const VERSION: u64 = 2;
+const VERSION: u64 = 2;
 
 /// A contact problem with its solution, if it is known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -48,7 +48,7 @@
 //! The residual of an angular row is an angular impulse L. It counts as the impulse P through the centers of
 //! mass that has the same energy, K L²/2 = (1/m_a + 1/m_b) P²/2. All rows are therefore in N·s.
 
-use super::problem::{ContactProblem, DPair, Target, Velocity};
+use super::problem::{ContactProblem, DPair, Target, Velocity, dot};
 pub use super::rows::{
     BlockLaw, LawLine, ProblemBlock, ProblemJoint, ProblemRow, ROWS, RowVector, row_scale,
 };
@@ -123,9 +123,7 @@ impl BlockLine {
 
     /// Its impulses, read from a vector.
     pub fn read(&self, impulses: &[DPair]) -> RowVector {
-        let mut own = [0.0; ROWS];
-        own.iter_mut().zip(&impulses[self.first..][..self.size]).for_each(|(own, pair)| *own = pair[0]);
-        own
+        read(impulses, self.first, self.size)
     }
 
     /// Writes its impulses into a vector.
@@ -148,8 +146,9 @@ impl BlockLine {
     }
 }
 
-fn dot(a: &Velocity, b: &Velocity) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+/// Impulses of the `size` rows of a block from row `first`.
+fn read(impulses: &[DPair], first: usize, size: usize) -> RowVector {
+    [0, 1, 2].map(|i| if i < size { impulses[first + i][0] } else { 0.0 })
 }
 
 /// Non-static bodies with their part of J, sign included.
@@ -187,8 +186,7 @@ fn apply(
     velocities: &mut [Velocity],
 ) {
     for (body, rows) in sides {
-        let b = &problem.bodies[*body];
-        let inverse = [b.inv_mass, b.inv_mass, b.inv_inertia];
+        let inverse = problem.bodies[*body].inverse();
         for (row, impulse) in rows.iter().zip(impulse) {
             for k in 0..3 {
                 velocities[*body][k] += inverse[k] * (row[k] * impulse);
@@ -259,8 +257,7 @@ impl ContactProblem {
     /// Adds M⁻¹ Jᵀ λ of all joints to the velocities.
     pub(super) fn push_joints(&self, impulses: &[DPair], velocities: &mut [Velocity]) {
         for (first, joint, block) in self.blocks() {
-            let mut own = [0.0; ROWS];
-            own.iter_mut().zip(&impulses[first..][..block.rows.len()]).for_each(|(own, pair)| *own = pair[0]);
+            let own = read(impulses, first, block.rows.len());
             apply(self, &sides(joint, block), own, velocities);
         }
     }
@@ -291,7 +288,6 @@ mod tests {
     use crate::lab::reference::certify::{Method, Uniqueness, reference};
     use crate::lab::reference::gallery::{machine, pendulum_rod};
     use crate::lab::reference::iterate::{Iteration, Stop, iterate};
-    use crate::lab::reference::residual::joint_residuals;
 
     fn close(name: &str, found: f64, expected: f64) {
         assert!((found - expected).abs() < 1e-11, "{name}: {found} is not {expected}");
@@ -333,7 +329,11 @@ mod tests {
     fn residuals_are_what_one_sweep_would_change() {
         let p = machine();
         let v = vec![[0.0; 3]; p.bodies.len()];
-        let r = joint_residuals(&p, Target::Rigid, &v, &p.no_impulses());
+        let residuals = |l: &[DPair]| -> Vec<f64> {
+            let lines = p.lines(Target::Rigid);
+            lines.iter().flat_map(|line| line.residuals(&v, l).into_iter().take(line.size)).collect()
+        };
+        let r = residuals(&p.no_impulses());
         // The motor stands still: 0.01 N·m·s are missing, scaled by √(K m) = √2/m.
         close("motor", r[0], -0.01 * 2.0_f64.sqrt());
         // Unloaded hinges at rest, and the open limit.
@@ -344,13 +344,9 @@ mod tests {
         // A limit that pushes although it is open.
         let mut l = p.no_impulses();
         l[4][0] = 0.5;
-        close(
-            "limit",
-            joint_residuals(&p, Target::Rigid, &v, &l)[3],
-            (12.0_f64).sqrt() * (1e-4 / p.h / 12.0),
-        );
+        close("limit", residuals(&l)[3], 12.0_f64.sqrt() * (1e-4 / p.h / 12.0));
         l[4][0] = -0.5;
-        close("pull", joint_residuals(&p, Target::Rigid, &v, &l)[3], -0.5 * (12.0_f64).sqrt());
+        close("pull", residuals(&l)[3], -0.5 * 12.0_f64.sqrt());
     }
 
     #[test]

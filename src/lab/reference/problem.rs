@@ -47,6 +47,11 @@ impl ProblemBody {
         [self.inv_mass, self.inv_mass, self.inv_inertia]
     }
 
+    /// Whether impulses change its motion.
+    pub fn moves(&self) -> bool {
+        self.inv_mass > 0.0 || self.inv_inertia > 0.0
+    }
+
     /// Finite masses of its three velocities; zero for infinite ones, whose components cannot change.
     fn masses(&self) -> Velocity {
         // The reciprocal of the smallest numbers is infinite, too.
@@ -179,7 +184,8 @@ impl ProblemContact {
     }
 }
 
-fn dot(a: &Velocity, b: &Velocity) -> f64 {
+/// Product of a row and velocities.
+pub(super) fn dot(a: &Velocity, b: &Velocity) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 

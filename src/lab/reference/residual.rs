@@ -22,42 +22,22 @@ use super::joints::BlockLine;
 use super::problem::{ContactProblem, DPair, Target, Velocity};
 use super::rows::{OwnRow, positive};
 
-/// Natural map (normal, tangential) of every contact (N·s). `velocities` need not follow from `impulses`.
-pub fn contact_residuals(
-    problem: &ContactProblem,
-    target: Target,
-    velocities: &[Velocity],
-    impulses: &[DPair],
-) -> Vec<DPair> {
-    let measure = LawMeasure::new(problem, target);
-    (0..problem.contacts.len()).map(|i| measure.contact(i, velocities, impulses)).collect()
-}
-
-/// Residual of every joint row (N·s), in their order; see [`super::joints`].
-///
-/// `velocities` need not follow from `impulses`.
-pub fn joint_residuals(
-    problem: &ContactProblem,
-    target: Target,
-    velocities: &[Velocity],
-    impulses: &[DPair],
-) -> Vec<f64> {
-    let lines = problem.lines(target);
-    lines.iter().flat_map(|line| line.residuals(velocities, impulses).into_iter().take(line.size)).collect()
-}
-
 /// A problem under a law, with all data that does not depend on impulses.
-pub(super) struct LawMeasure<'a> {
+pub struct LawMeasure<'a> {
     problem: &'a ContactProblem,
+    /// Whether residuals along the tangents count: a solver that ends with a sweep without friction has no law there.
+    pub friction: bool,
     diagonal: Vec<DPair>,
     rows: Vec<OwnRow>,
     lines: Vec<BlockLine>,
 }
 
 impl<'a> LawMeasure<'a> {
+    /// The law of `target`, with friction.
     pub fn new(problem: &'a ContactProblem, target: Target) -> Self {
         let rows = (0..problem.contacts.len()).map(|i| target.row(problem, i)).collect();
-        LawMeasure { problem, diagonal: problem.delassus_diagonal(), rows, lines: problem.lines(target) }
+        let (diagonal, lines) = (problem.delassus_diagonal(), problem.lines(target));
+        LawMeasure { problem, friction: true, diagonal, rows, lines }
     }
 
     fn contact(&self, i: usize, velocities: &[Velocity], impulses: &[DPair]) -> DPair {
@@ -65,10 +45,11 @@ impl<'a> LawMeasure<'a> {
         let [vn, ut] = c.velocity(velocities);
         let [ln, lt] = impulses[i];
         let un = vn + row.bias + row.compliance * ln;
-        law_residual(c.friction, [un, ut], [ln, lt], [1.0 / (gn + row.compliance), 1.0 / gt])
+        let [n, t] = law_residual(c.friction, [un, ut], [ln, lt], [1.0 / (gn + row.compliance), 1.0 / gt]);
+        [n, if self.friction { t } else { 0.0 }]
     }
 
-    /// See [`natural_map`].
+    /// See [`natural_map`]; `velocities` need not follow from `impulses`.
     pub fn natural_map(&self, velocities: &[Velocity], impulses: &[DPair]) -> f64 {
         let contacts = (0..self.problem.contacts.len()).flat_map(|i| self.contact(i, velocities, impulses));
         let joints = self.lines.iter().flat_map(|line| line.residuals(velocities, impulses));
@@ -122,6 +103,8 @@ mod tests {
         assert_eq!(law_residual(0.5, [1.0, 2.0], [4.0, -2.0], [1.0, 1.0]), [1.0, 0.0]);
         // A solver that blew up does not look exact.
         assert!(law_residual(0.5, [f64::NAN, f64::NAN], [1.0, 0.0], [1.0, 1.0]).iter().all(|r| r.is_nan()));
+        // Nor does an impulse that overflowed.
+        assert_eq!(law_residual(0.0, [0.0, 2.0], [f64::INFINITY, 1.0], [1.0; 2])[1], 2.0);
         assert!(largest([1.0, f64::NAN, 2.0].into_iter()).is_nan() && largest([].into_iter()) == 0.0);
     }
 

@@ -10,7 +10,7 @@ use crate::engine::bodies::BodyKind;
 use crate::engine::shapes::Shape;
 use crate::engine::world::World;
 use crate::lab::metrics::overlaps::Overlaps;
-use crate::lab::metrics::state::BodyState;
+use crate::lab::metrics::state::{BodyState, reaches};
 use glam::DVec2;
 use std::f64::consts::TAU;
 
@@ -153,12 +153,7 @@ impl HoldWatch {
     pub fn new(world: &World, demands: impl Into<Vec<Demand>>) -> Self {
         let demands = demands.into();
         let start = centers(world);
-        let mut reach = vec![0.0_f64; world.bodies.len()];
-        for (shape, &body) in world.shapes.iter().zip(&world.shape_body) {
-            let farthest = &mut reach[body as usize];
-            let radius = f64::from(shape.radius());
-            shape.for_each_vertex(|v| *farthest = farthest.max(f64::from(v.length()) + radius));
-        }
+        let mut reach = reaches(world);
         for (i, reach) in reach.iter_mut().enumerate() {
             if !world.bodies.is_dynamic(i) {
                 *reach = f64::INFINITY;

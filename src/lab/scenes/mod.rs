@@ -46,6 +46,7 @@ pub use format::{
     SegmentGeometry, schema,
 };
 pub use joints::SceneJoint;
+pub(in crate::lab) use truth::largest;
 pub use truth::{Observer, Truth};
 
 use crate::lab::error::Error;

@@ -108,7 +108,7 @@ impl<'a> View<'a> {
 }
 
 /// The largest of the distances and 0. NaN, which `f64::max` would drop, counts as infinite.
-pub(super) fn largest(distances: impl IntoIterator<Item = f64>) -> f64 {
+pub(in crate::lab) fn largest(distances: impl IntoIterator<Item = f64>) -> f64 {
     distances.into_iter().fold(0.0, |worst, d| if d.is_nan() { f64::INFINITY } else { worst.max(d) })
 }
 

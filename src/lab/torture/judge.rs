@@ -7,7 +7,7 @@ use crate::engine::solvers::{DEFAULT, find};
 use crate::engine::world::{Settings, World};
 use crate::lab::error::Error;
 use crate::lab::metrics::overlaps::Overlaps;
-use crate::lab::metrics::state::BodyState;
+use crate::lab::metrics::state::{BodyState, reaches};
 use glam::DVec2;
 
 /// Fraction of the energy budget above which a run counts as having gained energy. The budget is generous
@@ -224,19 +224,6 @@ impl<'c> Judge<'c> {
 fn height_energy(room: &Room, body: &BodyState, position: DVec2) -> f64 {
     let corner = |k: usize| if body.force[k] < 0.0 { room.low[k] } else { room.high[k] };
     -body.force.dot(position - DVec2::new(corner(0), corner(1)))
-}
-
-/// Farthest point of each body from its center of mass (m).
-fn reaches(world: &World) -> Vec<f64> {
-    let mut reaches = vec![0.0_f64; world.bodies.len()];
-    for (shape, &body) in world.shapes.iter().zip(&world.shape_body) {
-        let radius = f64::from(shape.radius());
-        shape.for_each_vertex(|v| {
-            let reach = &mut reaches[body as usize];
-            *reach = reach.max(f64::from(v.length()) + radius);
-        });
-    }
-    reaches
 }
 
 /// The energy budget of a case, see [`Ledger`].

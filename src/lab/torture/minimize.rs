@@ -30,9 +30,8 @@ pub fn minimize(
         Ok(outcome.faults.iter().find(|f| f.verdict == verdict).map(|f| f.step))
     };
     let mut best = case.clone();
-    // Faults that are judged at the end need the full length.
-    let shortens = !matches!(verdict, TortureVerdict::Sunk | TortureVerdict::Restless);
-    if let Some(step) = fails(&best)?.filter(|_| shortens) {
+    // Faults that are judged at the end have its step.
+    if let Some(step) = fails(&best)? {
         best.scene.steps = best.scene.steps.min(step + AFTER);
     }
     let mut size = removable(&best).len().div_ceil(2);

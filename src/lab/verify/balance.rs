@@ -154,8 +154,8 @@ pub(super) static CASES: &[Case] = &[
             };
             let below = bisect(0.8, 1.2, |part| stands(part * between / 3.0, 0.6))?;
             let beside = bisect(0.8, 1.2, |part| stands(0.6, part * between))?;
-            let worst = if (below - 1.0).abs() > (beside - 1.0).abs() { below } else { beside };
-            Ok(Finding::new(worst, 1.0, 0.01).note(format!("{below:.5} under, {beside:.5} between")))
+            Ok(Finding::new(farther(1.0, below, beside), 1.0, 0.01)
+                .note(format!("{below:.5} under, {beside:.5} between")))
         }),
     // Discs of radius r in a shaft of width w touch with their line of centers at sin β = (w − 2 r)/2 r from
     // the vertical. The floor bears 2 m g, each wall m g tan β, and the contact between the discs m g/cos β.
@@ -205,12 +205,6 @@ pub(super) static CASES: &[Case] = &[
         .not_required("friction makes the matrix indefinite, so Gauss–Seidel need not converge")
         .by(|lab| Ok(Finding::new(rod(lab)?[1], 0.0, 0.01))),
 ];
-
-/// Sum of the normal forces of the contacts of body `a` on others (N), in the last step.
-fn load_on(world: &World, a: u32) -> f64 {
-    let of_a = world.contacts.iter().filter(|c| c.body_a == a);
-    of_a.map(normal_impulse).sum::<f64>() / f64::from(world.settings.dt)
-}
 
 /// Angle of a card from the vertical (rad).
 const LEAN: f64 = 25.0 * PI / 180.0;

@@ -30,7 +30,7 @@ pub(super) static CASES: &[Case] = &[
                 largest([(apex - 1.0).abs(), 0.5 * f64::from(world.bodies.rotation_sin[1]).abs()])
             })?;
             if apexes < 5 {
-                return Err(Failure::Unmeasured(format!("{apexes} bounces of five")));
+                return Err(unmeasured(format!("{apexes} bounces of five")));
             }
             Ok(found)
         }),
@@ -233,24 +233,14 @@ pub(super) static CASES: &[Case] = &[
             let energy = |[vx, vy, w]: [f64; 3]| 0.5 * (vx * vx + vy * vy + inertia * w * w);
             let (mut worst, mut gain) = (0.0, 0.0);
             for (e, slip) in pairs(&[1.0, 0.9, 0.6], &[-1.5, -0.5, 0.2, 0.5, 1.5]) {
-                let d = k_nn * k_tt - k_nt * k_nt;
-                let sticking: f64 = -((1.0 + e) * k_nt + slip * k_nn) / d;
-                let normal = |t: f64| (1.0 + e - k_nt * t) / k_nn;
-                let sliding = mu * sticking.signum();
-                let bound = sliding * (1.0 + e) / (k_nn + sliding * k_nt);
-                let coulomb = if sticking.abs() > mu * normal(sticking) { bound } else { sticking };
-                let made = |part: f64| {
+                let [coulomb, _] = rough_impulse([k_nn, k_tt, k_nt], [slip, -1.0], e, mu);
+                let with = |part: f64| {
                     let t = part * coulomb;
-                    energy(after([normal(t), t], slip)) - energy([slip, -1.0, 0.0])
+                    after([(1.0 + e - k_nt * t) / k_nn, t], slip)
                 };
+                let made = |part: f64| energy(with(part)) - energy([slip, -1.0, 0.0]);
                 gain = largest([gain, made(1.0)]);
-                let (mut least, mut most) = (0.0, 1.0);
-                for _ in 0..50 {
-                    let middle = 0.5 * (least + most);
-                    *(if made(middle) > 0.0 { &mut most } else { &mut least }) = middle;
-                }
-                let t = least * coulomb;
-                let truth = after([normal(t), t], slip);
+                let truth = with(bisect(0.0, 1.0, |part| Ok(made(part) > 0.0))?);
                 let shape = SceneShape::rectangle(half, thin).density(0.25 / (half * thin));
                 let body = SceneBody::dynamic([0.0, -y], shape.friction(mu).restitution(e));
                 let body = body.turned(FRAC_PI_4).moving([slip, -1.0], 0.0);

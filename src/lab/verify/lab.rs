@@ -4,7 +4,7 @@ pub(super) use super::{Case, Failure, Finding};
 pub(super) use crate::engine::bodies::BodyKind;
 pub(super) use crate::engine::contacts::Contact;
 pub(super) use crate::engine::world::World;
-pub(super) use crate::lab::scenes::{Geometry, Scene, SceneBody, SceneJoint, SceneShape};
+pub(super) use crate::lab::scenes::{Geometry, Scene, SceneBody, SceneJoint, SceneShape, largest};
 pub(super) use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, FRAC_PI_4, PI, TAU};
 
 use super::{ParameterSweep, SweepRow};
@@ -113,11 +113,10 @@ impl Lab {
     /// its reference value reports.
     pub(super) fn catalog(&self, name: &str, tolerance: f64) -> Measured {
         let loaded = scenes::load(name)?;
-        let mut truth =
-            loaded.truth.ok_or_else(|| Failure::Unmeasured(format!("{name} has no reference value")))?;
+        let mut truth = loaded.truth.ok_or_else(|| unmeasured(format!("{name} has no reference value")))?;
         let seconds = f64::from(loaded.scene.steps) * loaded.scene.dt;
         self.run(loaded.scene, seconds, |world| truth.observer.observe(world))?;
-        let error = truth.observer.error().ok_or_else(|| Failure::Unmeasured("nothing observed".into()))?;
+        let error = truth.observer.error().ok_or_else(|| unmeasured("nothing observed"))?;
         Ok(Finding::new(error, 0.0, tolerance))
     }
 
@@ -257,9 +256,15 @@ pub(super) fn impulse(contact: &Contact) -> [f64; 2] {
     [normal * nx + tangent * ny, normal * ny - tangent * nx]
 }
 
-/// Upward load on static bodies over the last step (N).
+/// Sum of the normal forces of the contacts of body `a` on others over the last step (N).
+pub(super) fn load_on(world: &World, a: u32) -> f64 {
+    let of_a = world.contacts.iter().filter(|c| c.body_a == a);
+    of_a.map(normal_impulse).sum::<f64>() / f64::from(world.settings.dt)
+}
+
+/// Upward load on static and kinematic bodies over the last step (N).
 pub(super) fn ground_load(world: &World) -> f64 {
-    let on_ground = |c: &&Contact| world.bodies.kind[c.body_a as usize] == BodyKind::Static;
+    let on_ground = |c: &&Contact| !world.bodies.is_dynamic(c.body_a as usize);
     let sum: f64 = world.contacts.iter().filter(on_ground).map(|c| impulse(c)[1]).sum();
     sum / f64::from(world.settings.dt)
 }
@@ -300,9 +305,14 @@ pub(super) fn overlap_ratio(world: &World) -> f64 {
     largest(depths(world).into_iter().map(|(_, depth, soft)| depth.max(0.0) / soft.max(SLOP)))
 }
 
-/// The largest of `values` and 0; infinite if one is not a number.
-pub(super) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
-    values.into_iter().fold(0.0, |m, v| if v.is_nan() { f64::INFINITY } else { m.max(v) })
+/// The value that is farther from `truth`; the first if both are as far.
+pub(super) fn farther(truth: f64, a: f64, b: f64) -> f64 {
+    if (b - truth).abs() > (a - truth).abs() { b } else { a }
+}
+
+/// The event to be measured did not happen.
+pub(super) fn unmeasured(why: impl Into<String>) -> Failure {
+    Failure::Unmeasured(why.into())
 }
 
 /// The value of the parameter at which it is farthest from `truth`, with its note.
@@ -475,8 +485,6 @@ mod tests {
         let found = |limit: f64| sweep("x", &[1.0, 2.0, 4.0], |x| Ok((2.0 * x, x < limit))).unwrap();
         assert_eq!((found(3.0).measured, found(0.0).measured, found(9.0).measured), (2.0, 0.0, 4.0));
         assert!(found(9.0).passed() && !found(3.0).passed());
-        assert_eq!(largest([1.0, f64::NAN]), f64::INFINITY);
-        assert_eq!(largest([]), 0.0);
     }
 
     #[test]

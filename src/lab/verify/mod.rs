@@ -51,8 +51,6 @@
 //!   (½)²·6 = 2.5, so the impulse that stops the points is 1/2.5 of the one that stops the box. The rest
 //!   rotates the box. Two sweeps with friction leave a speed of up to 0.6² g h sin θ once. If µ exceeds tan θ
 //!   only slightly, friction takes long to stop it.
-//! - **Seams under boxes.** Contacts look ahead by 2 cm, so a box that overlaps a floor of tiles by a
-//!   micrometer collides with the side of the next tile (A24.tiles).
 //! - **Plastic impacts of many bodies.** If an impact needs more visits than its bound, sweeps do the rest:
 //!   two in each substep, starting from the impulses of the previous substep.
 //! - **Rotating frames.** Within a step, bodies move along tangents and contacts keep their normals, so a
@@ -80,7 +78,7 @@ mod sliding;
 mod springs;
 
 pub use lab::Lab;
-pub use runner::{CaseProgress, Cell, VerifyMatrix, run, select};
+pub use runner::{Cell, VerifyMatrix, run, select};
 
 use crate::engine::solvers::Variant;
 use crate::engine::world::Divergence;

@@ -85,7 +85,7 @@ pub(super) static CASES: &[Case] = &[
             let (fastest, slowest) =
                 (speeds().fold(f64::INFINITY, f64::min), speeds().fold(f64::NEG_INFINITY, f64::max));
             if fastest > -0.3 * G {
-                return Err(Failure::Unmeasured("the column does not fall".into()));
+                return Err(unmeasured("the column does not fall"));
             }
             Ok(Finding::new(slowest - fastest, 0.0, 0.05))
         }),
@@ -138,7 +138,7 @@ pub(super) static CASES: &[Case] = &[
                 })?;
                 let height = world.bodies.center(top)[1];
                 if (height - 10.5).abs() > 0.1 {
-                    return Err(Failure::Unmeasured(format!("the heavy box is at {height:.3} m")));
+                    return Err(unmeasured(format!("the heavy box is at {height:.3} m")));
                 }
                 dt = f64::from(world.settings.dt);
             }

@@ -12,7 +12,7 @@ pub(super) static CASES: &[Case] = &[
         .required("each turn loses 2 µ N/k; the spring keeps its energy at ζ = 0")
         .by(|lab| {
             let scene = on_spring(ground(40.0, 0.2), 1.0, 0.2);
-            let (_, amplitude) = *turns(lab, scene, 5.0)?.get(9).ok_or_else(|| missing("no ten turns"))?;
+            let (_, amplitude) = *turns(lab, scene, 5.0)?.get(9).ok_or_else(|| unmeasured("no ten turns"))?;
             Ok(Finding::new(amplitude.abs(), 0.6, 0.01))
         }),
     // The block stops after 25 half periods, at 7.85 s.
@@ -37,7 +37,7 @@ pub(super) static CASES: &[Case] = &[
         .required("a spring without damping is off by (ωh)²/24")
         .by(|lab| {
             let turns = on_belt(lab)?;
-            let [first, .., last] = turns[..] else { return Err(missing("no turns")) };
+            let [first, .., last] = turns[..] else { return Err(unmeasured("no turns")) };
             let period = 2.0 * (last.0 - first.0) / (turns.len() - 1) as f64;
             Ok(Finding::new(period, TAU / 10.0, 0.01 * TAU / 10.0))
         }),
@@ -89,16 +89,12 @@ pub(super) static CASES: &[Case] = &[
             lab.most(scene, 0.0..2.0, 0.02, |world| {
                 state = (0..100).fold(state, |s, _| runge_kutta(s, f64::from(world.settings.dt) / 100.0));
                 let tip = [state[0].sin() + state[1].sin(), -state[0].cos() - state[1].cos()];
-                let ([x, y], turned) = (center(world, 2), turned(world, 2));
+                let ([x, y], turned) = (center(world, 2), angle(world, 2));
                 let own = [x + 0.5 * turned.sin(), y - 0.5 * turned.cos()];
                 (tip[0] - own[0]).hypot(tip[1] - own[1])
             })
         }),
 ];
-
-fn missing(what: &str) -> Failure {
-    Failure::Unmeasured(what.into())
-}
 
 /// A block of 1 kg on a spring of 100 N/m with its rest position at 0. `friction` is the block's coefficient.
 fn on_spring(ground: SceneBody, start: f64, friction: f64) -> Scene {
@@ -154,11 +150,6 @@ fn pinned(angle: f64) -> Scene {
     Scene::new("pendulum", bodies).joined(vec![SceneJoint::revolute(0, 1, [0.0, 0.0], [0.0, 0.5])])
 }
 
-/// Angle of a rod from its lowest position, within half a turn (rad).
-fn turned(world: &World, i: usize) -> f64 {
-    f64::from(world.bodies.angle(i))
-}
-
 /// Moment of inertia of the rod about its end, as a multiple of m L² (1).
 fn about_end() -> f64 {
     (1.0 + WIDTH * WIDTH) / 12.0 + 0.25
@@ -171,7 +162,7 @@ fn fall(lab: &Lab) -> Result<([f64; 2], [f64; 2]), Failure> {
     let mut before = (0.0, PI - 0.1, 0.0);
     let mut found = None;
     lab.run(pinned(PI - 0.1), 1.5, |world| {
-        let now = (time(world), turned(world, 1).abs(), spin(world, 1).abs());
+        let now = (time(world), angle(world, 1).abs(), spin(world, 1).abs());
         if found.is_none() && now.1 <= FRAC_PI_2 {
             let share = (before.1 - FRAC_PI_2) / (before.1 - now.1);
             found = Some([before.0 + share * (now.0 - before.0), before.2 + share * (now.2 - before.2)]);
@@ -187,7 +178,7 @@ fn fall(lab: &Lab) -> Result<([f64; 2], [f64; 2]), Failure> {
     let weight = |i: usize| if i == 0 || i == count as usize { 1.0 } else { 2.0 + 2.0 * (i % 2) as f64 };
     let sum: f64 = (0..=count as usize).map(|i| weight(i) * rate(i)).sum();
     let truth = [sum * end / (3.0 * f64::from(count)), speed(FRAC_PI_2)];
-    Ok((found.ok_or_else(|| Failure::Unmeasured("it did not fall".into()))?, truth))
+    Ok((found.ok_or_else(|| unmeasured("it did not fall"))?, truth))
 }
 
 /// K(k) ÷ (π/2) by the arithmetic-geometric mean, with k = sin(θ/2): the period relative to that of small
@@ -205,7 +196,7 @@ fn periods(lab: &Lab, amplitude: f64) -> Result<f64, Failure> {
     let truth = elliptic(amplitude) * TAU * (about_end() / (0.5 * G)).sqrt();
     let (mut crossings, mut before) = (vec![], (0.0, amplitude));
     lab.run(pinned(amplitude), 6.0 * truth, |world| {
-        let now = (time(world), turned(world, 1));
+        let now = (time(world), angle(world, 1));
         if before.1 > 0.0 && now.1 <= 0.0 && before.1 < 2.0 {
             crossings.push(before.0 + (now.0 - before.0) * before.1 / (before.1 - now.1));
         }
@@ -213,7 +204,7 @@ fn periods(lab: &Lab, amplitude: f64) -> Result<f64, Failure> {
     })?;
     match crossings[..] {
         [first, _, _, _, _, last, ..] => Ok((last - first) / (5.0 * truth)),
-        _ => Err(Failure::Unmeasured("no five periods".into())),
+        _ => Err(unmeasured("no five periods")),
     }
 }
 

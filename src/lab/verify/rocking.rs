@@ -62,7 +62,7 @@ pub(super) static CASES: &[Case] = &[
             })?;
             let around = |step: usize| Some((*energies.get(step.checked_sub(2)?)?, *energies.get(step + 5)?));
             let Some((before, after)) = down.and_then(around) else {
-                return Err(Failure::Unmeasured("the block does not land".into()));
+                return Err(unmeasured("the block does not land"));
             };
             let truth = (1.0 - 1.5 * b * b / (b * b + h * h)).powi(2);
             Ok(Finding::new(after / before, truth, 0.01 * truth))
@@ -89,7 +89,7 @@ pub(super) static CASES: &[Case] = &[
                 before = now;
             })?;
             let [first, .., last] = crossings[..] else {
-                return Err(Failure::Unmeasured("the plank does not swing".into()));
+                return Err(unmeasured("the plank does not swing"));
             };
             let period = 2.0 * (last - first) / (crossings.len() - 1) as f64;
             let truth = TAU * ((d - friction * b) / (friction * G)).sqrt();

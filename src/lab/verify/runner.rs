@@ -71,25 +71,15 @@ pub fn select(wanted: &[String]) -> Result<Vec<&'static Case>, Error> {
     Ok(CASES.iter().copied().filter(chosen).collect())
 }
 
-/// Progress report at the start of a run.
-#[derive(Clone, Debug)]
-pub struct CaseProgress {
-    /// Number of finished runs.
-    pub done: usize,
-    /// Total number of runs.
-    pub total: usize,
-    /// Case and solver of the run.
-    pub what: String,
-}
-
 /// Runs every case with the laboratory that `lab` builds for each solver, on `threads` threads. Runs share no
-/// state, so the results do not depend on the number of threads.
+/// state, so the results do not depend on the number of threads. `tell` gets the numbers of finished and of all runs,
+/// and the case and solver of the one that starts.
 pub fn run(
     cases: Vec<&'static Case>,
     solvers: Vec<&'static Variant>,
     threads: usize,
     lab: impl Fn(&'static Variant) -> Lab + Sync,
-    tell: &(dyn Fn(CaseProgress) + Sync),
+    tell: &(dyn Fn(usize, usize, &str) + Sync),
 ) -> VerifyMatrix {
     let total = cases.len() * solvers.len();
     let slots: Vec<Mutex<Cell>> = (0..total).map(|_| Mutex::new(Cell::Foreign)).collect();
@@ -101,8 +91,7 @@ pub fn run(
                 return;
             }
             let (case, solver) = (cases[i / solvers.len()], solvers[i % solvers.len()]);
-            let what = format!("{} with {}", case.id, solver.name);
-            tell(CaseProgress { done: done.load(Ordering::Relaxed), total, what });
+            tell(done.load(Ordering::Relaxed), total, &format!("{} with {}", case.id, solver.name));
             let cell = judge(case, &lab(solver), solver);
             // A panicking thread aborts the whole scope, so no poisoned slot is ever read.
             if let Ok(mut slot) = slots[i].lock() {

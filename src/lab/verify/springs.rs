@@ -93,7 +93,7 @@ pub(super) static CASES: &[Case] = &[
         .by(|lab| {
             threshold(0.9..1.1, 1.0, 0.005, |part| {
                 let world = lab.run(hinged(FRAC_PI_2, driven(0.0, part * 0.5 * G)), 4.0, |_| ())?;
-                Ok((f64::from(world.bodies.angle(1)) - FRAC_PI_2).abs() < 0.05)
+                Ok((angle(&world, 1) - FRAC_PI_2).abs() < 0.05)
             })
         }),
     // A rod falls from the horizontal onto a limit 0.3 rad beyond its lowest position and swings on.
@@ -103,7 +103,7 @@ pub(super) static CASES: &[Case] = &[
         .by(|lab| {
             let hinge = Revolute { limits: Some([-0.3, 2.0]), ..Revolute::default() };
             lab.most(hinged(FRAC_PI_2, hinge), 0.0..5.0, 1e-3, |world| {
-                let angle = f64::from(world.bodies.angle(1));
+                let angle = angle(world, 1);
                 largest([-0.3 - angle, angle - 2.0])
             })
         }),

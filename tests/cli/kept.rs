@@ -1,6 +1,6 @@
 //! Files left after an interrupt, and differences between two runs of the same program.
 
-use crate::succeeds;
+use crate::{interrupted, succeeds};
 use simpulse::lab::compare::{CompareOptions, Comparison, Verdict, compare};
 use simpulse::lab::report::study_file::StudyFile;
 use std::path::Path;
@@ -8,24 +8,16 @@ use std::path::Path;
 #[cfg(unix)]
 #[test]
 fn an_interrupt_keeps_what_was_there_and_leaves_nothing_behind() {
-    use std::process::{Command, Stdio};
-    use std::time::Duration;
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     std::fs::create_dir(path.join("old")).unwrap();
     std::fs::write(path.join("old/replay-1.rec"), "of before").unwrap();
     for out in ["old", "new/inner"] {
-        let args = ["study", "--scenes", "pyramid:60", "--solvers", "shim", "--out", out];
-        let mut run = Command::new(env!("CARGO_BIN_EXE_simpulse"));
-        let run = run.current_dir(path).args(args).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let child = run.spawn().unwrap();
         // The folder is in use as soon as the study has begun.
-        while std::fs::read_dir(path.join(out)).map_or(0, |all| all.count()) < usize::from(out == "old") + 1 {
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        let pid = child.id().to_string();
-        assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
-        let output = child.wait_with_output().unwrap();
+        let files = || std::fs::read_dir(path.join(out)).map_or(0, |all| all.count());
+        let is_used = || files() > usize::from(out == "old");
+        let study = format!("study --scenes pyramid:60 --solvers shim --out {out}");
+        let output = interrupted(path, &study, "-INT", is_used);
         let message = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(130), "{message}");
         assert!(message.contains("nothing written"), "{message}");
@@ -48,7 +40,7 @@ fn told(found: &Comparison) -> [usize; 2] {
     [Verdict::Worse, Verdict::Better].map(|verdict| verdicts.iter().filter(|v| **v == verdict).count())
 }
 
-/// `cargo test --release --test pages null_race -- --ignored --nocapture`: how often a program compared with
+/// `cargo test --release --test cli null_race -- --ignored --nocapture`: how often a program compared with
 /// itself is reported to differ (never, even on a busy machine), and how often a solver that is slower by a
 /// tenth is found (nine times out of ten). The slower solver is the second run with its times lengthened by a
 /// tenth.
@@ -79,7 +71,7 @@ fn null_race() {
     assert!(differ == 0 && 10 * found >= 9 * TRIES);
 }
 
-/// `cargo test --release --test pages agree_on_the_time -- --ignored`: `run` and `study` report the same time for a
+/// `cargo test --release --test cli agree_on_the_time -- --ignored`: `run` and `study` report the same time for a
 /// step, within a fifth.
 #[test]
 #[ignore = "measures times; needs a machine that is not too busy"]

@@ -1,6 +1,7 @@
 //! `simpulse advise`: its recommendation holds, it finds out what a file does not say, and it reports what it
 //! cannot do.
 
+use crate::{refused, simpulse, text};
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::find;
 use simpulse::engine::world::{Order, Settings};
@@ -10,16 +11,6 @@ use simpulse::lab::scenes::tolerance::GivenTolerances;
 use simpulse::lab::study::answer::Answer;
 use simpulse::lab::study::{self, Record, StudyPlan, observe, open_scene};
 use simpulse::lab::trial::Trial;
-use std::path::Path;
-use std::process::{Command, Output};
-
-fn simpulse(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_simpulse")).current_dir(folder).args(args).output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> &str {
-    std::str::from_utf8(bytes).unwrap()
-}
 
 /// A disc on two crates, and a big box dropped beside them.
 const GAME: &str = r#"{ "name": "game", "steps": 300, "bodies": [
@@ -95,8 +86,8 @@ fn a_limit_out_of_reach_has_a_nearest_setting_and_no_advice() {
 fn a_file_that_says_nothing_must_rest_if_the_default_solver_brings_it_to_rest() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("game.json"), GAME).unwrap();
-    let args = ["advise", "game.json", "--max-penetration", "5mm", "--solvers", "pgs,soft_step,shim"];
-    let json = simpulse(folder.path(), &[&args[..], &["--repeats", "1", "--json"]].concat());
+    let words = "advise game.json --max-penetration 5mm --solvers pgs,soft_step,shim --repeats 1 --json";
+    let json = simpulse(folder.path(), words);
     let json: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
     let said = json["found_out"][0].as_str().unwrap();
     assert!(said.contains("does not say what must hold") && said.contains("rest is required"), "{said}");
@@ -113,8 +104,7 @@ fn a_file_that_says_nothing_must_rest_if_the_default_solver_brings_it_to_rest() 
     // A body that falls for ever need not rest, and that is said first.
     let falls = GAME.replace("[3, 3]", "[30, 3]");
     std::fs::write(folder.path().join("falls.json"), falls).unwrap();
-    let out =
-        simpulse(folder.path(), &["advise", "falls.json", "--max-penetration", "5mm", "--solvers", "shim"]);
+    let out = simpulse(folder.path(), "advise falls.json --max-penetration 5mm --solvers shim");
     let first: String = text(&out.stdout).lines().take(3).collect::<Vec<_>>().join(" ");
     assert!(
         first.starts_with("falls.json does not say") && first.contains("does not come to rest"),
@@ -125,10 +115,11 @@ fn a_file_that_says_nothing_must_rest_if_the_default_solver_brings_it_to_rest() 
 #[test]
 fn the_program_prints_evidence_and_writes_it() {
     let folder = tempfile::tempdir().unwrap();
-    let common = ["--steps", "60", "--repeats", "1", "--lanes", "1,8"];
-    let with = |args: &[&str]| simpulse(folder.path(), &[&["advise"], args, &common].concat());
-    let limits = ["stack:3", "--max-penetration", "5mm", "--max-time", "1s"];
-    let found = with(&limits);
+    let with = |words: &str| {
+        simpulse(folder.path(), &format!("advise stack:3 --steps 60 --repeats 1 --lanes 1,8 {words}"))
+    };
+    let limits = "--max-penetration 5mm --max-time 1s";
+    let found = with(limits);
     let out = text(&found.stdout);
     assert_eq!(found.status.code(), Some(0), "{}", text(&found.stderr));
     for part in [
@@ -142,18 +133,18 @@ fn the_program_prints_evidence_and_writes_it() {
     ] {
         assert!(out.contains(part), "'{part}' is not in:\n{out}");
     }
-    let json = |args: &[&str]| -> serde_json::Value {
-        serde_json::from_slice(&with(&[args, &["--json"]].concat()).stdout).unwrap()
+    let json = |words: &str| -> serde_json::Value {
+        serde_json::from_slice(&with(&format!("{words} --json")).stdout).unwrap()
     };
-    let found = json(&limits);
+    let found = json(limits);
     assert!(found["best"]["errors"]["held_depth_p99_m"].as_f64().unwrap() <= 5e-3);
     assert_eq!(found["max_step_ns"], 1e9);
     assert!(found["trials"].as_array().unwrap().len() > 4);
     let cpu = &found["environment"]["cpu"];
     assert!(cpu.is_string(), "{cpu}");
 
-    let limits = ["stack:3", "--max-penetration", "1nm", "--solvers", "pgs"];
-    let none = with(&limits);
+    let limits = "--max-penetration 1nm --solvers pgs";
+    let none = with(limits);
     let out = text(&none.stdout);
     assert_eq!(none.status.code(), Some(1), "{}", text(&none.stderr));
     assert!(
@@ -161,10 +152,10 @@ fn the_program_prints_evidence_and_writes_it() {
         "{out}"
     );
     assert!(out.contains("times its tolerance for penetration"), "{out}");
-    let none = json(&limits);
+    let none = json(limits);
     assert!(none["best"].is_null() && none["nearest"]["solver"] == "pgs");
     // A time out of reach.
-    let none = with(&["stack:3", "--max-penetration", "5mm", "--max-time", "1ns", "--solvers", "pgs"]);
+    let none = with("--max-penetration 5mm --max-time 1ns --solvers pgs");
     assert_eq!(none.status.code(), Some(1));
     assert!(text(&none.stdout).contains("takes "), "{}", text(&none.stdout));
 }
@@ -172,35 +163,24 @@ fn the_program_prints_evidence_and_writes_it() {
 #[test]
 fn bad_requests_are_refused_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
-    let table: &[(&[&str], &[&str])] = &[
-        (&["staack", "--max-penetration", "1mm"], &["'staack'", "'stack'"]),
-        (&["stack:3"], &["set at least one limit"]),
-        (&["stack:3", "--max-time", "1ms"], &["set at least one limit"]),
-        (&["stack:3", "--max-penetration", "1"], &["max-penetration", "'1'", "unit"]),
-        (&["stack:3", "--max-penetration", "1furlong"], &["'1furlong'", "'furlong'", "mm"]),
-        (&["stack:3", "--max-penetration", "1mm", "--max-time", "5mm"], &["max-time", "'5mm'", "us"]),
-        (&["stack:3", "--max-penetration", "-1mm"], &["'-1mm'"]),
-        (&["stack:3", "--max-residual", "1%"], &["max-residual", "'1%'"]),
-        (&["stack:3", "--max-reference", "5N"], &["max-reference", "'5N'"]),
-        (&["circle_pile:10", "--max-reference", "1mm"], &["max-reference", "circle_pile:10"]),
-        (&["smash", "--max-penetration", "1mm", "--max-rest-speed", "1m/s"], &["max-rest-speed", "smash"]),
-        (&["stack:3", "--max-penetration", "1mm", "--lanes", "3"], &["lanes", "3"]),
-        (&["stack:3", "--max-penetration", "1mm", "--solvers", "pgz"], &["'pgz'", "'pgs'"]),
-        (&["stack:3", "--max-penetration", "1mm", "--steps", "0"], &["steps", "0"]),
-        (&["stack:3", "--max-penetration", "1mm", "--repeats", "0"], &["repeats", "0"]),
+    let table: &[(&str, &[&str])] = &[
+        ("staack --max-penetration 1mm", &["'staack'", "'stack'"]),
+        ("stack:3", &["set at least one limit"]),
+        ("stack:3 --max-time 1ms", &["set at least one limit"]),
+        ("stack:3 --max-penetration 1", &["max-penetration", "'1'", "unit"]),
+        ("stack:3 --max-penetration 1furlong", &["'1furlong'", "'furlong'", "mm"]),
+        ("stack:3 --max-penetration 1mm --max-time 5mm", &["max-time", "'5mm'", "us"]),
+        ("stack:3 --max-penetration -1mm", &["'-1mm'"]),
+        ("stack:3 --max-residual 1%", &["max-residual", "'1%'"]),
+        ("stack:3 --max-reference 5N", &["max-reference", "'5N'"]),
+        ("circle_pile:10 --max-reference 1mm", &["max-reference", "circle_pile:10"]),
+        ("smash --max-penetration 1mm --max-rest-speed 1m/s", &["max-rest-speed", "smash"]),
+        ("stack:3 --max-penetration 1mm --lanes 3", &["lanes", "3"]),
+        ("stack:3 --max-penetration 1mm --solvers pgz", &["'pgz'", "'pgs'"]),
+        ("stack:3 --max-penetration 1mm --steps 0", &["steps", "0"]),
+        ("stack:3 --max-penetration 1mm --repeats 0", &["repeats", "0"]),
     ];
-    for (args, parts) in table {
-        let output = simpulse(folder.path(), &[&["advise"], *args].concat());
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{args:?}: {message}");
-        assert!(
-            message.starts_with("error: ") && message.trim_end().lines().count() == 1,
-            "{args:?}: {message}"
-        );
-        for part in *parts {
-            assert!(message.contains(part), "{args:?}: '{part}' is not in: {message}");
-        }
-        assert!(output.stdout.is_empty(), "{args:?}");
+    for (words, parts) in table {
+        refused(folder.path(), &format!("advise {words}"), parts);
     }
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }

@@ -1,14 +1,41 @@
-//! The program from the user's point of view: what it rejects, and what a small study produces.
+//! The program from the user's point of view: what it rejects, what a small study produces, pictures, recordings and
+//! documents. Pages are tested in a real browser if there is one.
+
+mod advise;
+mod browser;
+mod documents;
+mod kept;
+mod replay;
+mod report;
 
 use simpulse::engine::solvers::VARIANTS;
 use simpulse::lab::report::study_file::StudyFile;
 use simpulse::lab::report::{answer, columns};
 use simpulse::lab::study::DEFAULT_SOLVERS;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
-fn simpulse(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_simpulse")).current_dir(folder).args(args).output().unwrap()
+/// The program with these words, in a folder.
+fn command(folder: &Path, words: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_simpulse"));
+    command.current_dir(folder).args(words.split_whitespace());
+    command
+}
+
+fn simpulse(folder: &Path, words: &str) -> Output {
+    command(folder, words).output().unwrap()
+}
+
+/// Starts the program and sends it a signal as soon as `is_ready`, or it ends.
+#[cfg(unix)]
+fn interrupted(folder: &Path, words: &str, signal: &str, is_ready: impl Fn() -> bool) -> Output {
+    let mut child = command(folder, words).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    while !is_ready() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let pid = child.id().to_string();
+    assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
+    child.wait_with_output().unwrap()
 }
 
 fn text(bytes: &[u8]) -> &str {
@@ -23,7 +50,7 @@ fn errors(output: &Output) -> String {
 
 /// Runs the program with these words; it must succeed. Returns standard output.
 fn succeeds(folder: &Path, words: &str) -> String {
-    let output = simpulse(folder, &words.split_whitespace().collect::<Vec<_>>());
+    let output = simpulse(folder, words);
     assert_eq!(output.status.code(), Some(0), "{words}: {}", text(&output.stderr));
     text(&output.stdout).to_string()
 }
@@ -45,17 +72,17 @@ fn has_word(text: &str, word: &str) -> bool {
 
 /// Checks for exit code 2, one line on standard error that begins with `error:` and contains `parts`, no
 /// standard output, and no new file.
-fn refused(folder: &Path, args: &[&str], parts: &[&str]) {
+fn refused(folder: &Path, words: &str, parts: &[&str]) {
     let before = entries(folder);
-    let output = simpulse(folder, args);
+    let output = simpulse(folder, words);
     let message = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{args:?}: {message}");
-    assert!(message.starts_with("error: ") && message.trim_end().lines().count() == 1, "{args:?}: {message}");
+    assert_eq!(output.status.code(), Some(2), "{words}: {message}");
+    assert!(message.starts_with("error: ") && message.trim_end().lines().count() == 1, "{words}: {message}");
     for part in parts {
-        assert!(message.contains(part), "{args:?}: '{part}' is not in: {message}");
+        assert!(message.contains(part), "{words}: '{part}' is not in: {message}");
     }
-    assert!(output.stdout.is_empty(), "{args:?}: {}", text(&output.stdout));
-    assert_eq!(entries(folder), before, "{args:?}");
+    assert!(output.stdout.is_empty(), "{words}: {}", text(&output.stdout));
+    assert_eq!(entries(folder), before, "{words}");
 }
 
 #[test]
@@ -65,7 +92,7 @@ fn a_scene_in_pixels_is_told_to_set_its_length_unit() {
         let bodies = r#"[{"type": "dynamic", "position": [0, 0], "shapes": [{"circle": {"radius": 50}}]}]"#;
         let scene = format!(r#"{{"name": "x", "steps": 1, "length_unit": {unit}, "bodies": {bodies}}}"#);
         std::fs::write(folder.path().join("x.json"), scene).unwrap();
-        let told = errors(&simpulse(folder.path(), &["run", "x.json"]));
+        let told = errors(&simpulse(folder.path(), "run x.json"));
         assert_eq!(told.contains("set \"length_unit\""), is_told, "{told}");
     }
 }
@@ -73,78 +100,72 @@ fn a_scene_in_pixels_is_told_to_set_its_length_unit() {
 #[test]
 fn bad_requests_are_refused_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
-    let table: &[(&[&str], &[&str])] = &[
-        (&["run", "staack"], &["unknown scene 'staack'", "'stack'"]),
-        (&["run", "stack:x"], &["'x'", "stack"]),
-        (&["run", "stack:0"], &["'0'"]),
-        (&["list", "arhc", "--json"], &["'arch'"]),
+    let table: &[(&str, &[&str])] = &[
+        ("run staack", &["unknown scene 'staack'", "'stack'"]),
+        ("run stack:x", &["'x'", "stack"]),
+        ("run stack:0", &["'0'"]),
+        ("list arhc --json", &["'arch'"]),
         (
-            &["run", "stack:2", "--solver", "softstep"],
+            "run stack:2 --solver softstep",
             &["'softstep'", "'soft_step'", "[possible values: projection, pgs, "],
         ),
-        (&["run", "stack:2", "--lanes", "5"], &["lanes", "5", "1, 4, 8, 16"]),
-        (&["converge", "stack:2", "--lanes", "3"], &["lanes", "3", "1, 4, 8, 16"]),
-        (&["profile", "stack:2", "--seconds", "nan"], &["seconds", "NaN"]),
-        (&["verify", "--cases", "B9.gapp"], &["'B9.gapp'", "'B9.gap'"]),
-        (&["verify", "--random", "dropz:17"], &["'dropz'", "'drops'"]),
-        (&["verify", "--random", "0"], &["--random", "'0'", "1000000"]),
-        (&["verify", "--keep", "failed"], &["--random"]),
-        (&["verify", "--solvers", "pgs", "--without", "all"], &["pgs", "shim"]),
-        (&["torture"], &["simpulse verify --random N"]),
-        (&["completions", "tcsh"], &["tcsh", "bash", "fish", "zsh"]),
-        (&["scene"], &["simpulse list SCENE"]),
-        (&["list", "solvers", "--seed", "2"], &["seed", "solvers"]),
-        (&["run", "stack:2", "--order", "natral"], &["'natral'", "'natural'", "colored"]),
-        (&["run", "stack:2", "--order", "natural", "--lanes", "8"], &["lanes", "8"]),
-        (&["run", "stack:2", "--substeps", "0"], &["substeps", "0"]),
-        (&["run", "stack:2", "--substeps", "10001"], &["substeps", "10001"]),
-        (&["run", "stack:2", "--solver", "soft_step", "--set", "contact_hertz=-3"], &["contact_hertz", "-3"]),
-        (&["study", "--set", "contact_hertz=nan"], &["contact_hertz", "NaN"]),
-        (&["--quick", "--scenes", "staack"], &["unknown scene 'staack'", "'stack'"]),
-        (&["study", "--scenes="], &["--scenes: the list is empty"]),
-        (&["study", "--solvers", ""], &["--solvers: the list is empty"]),
-        (&["study", "--lanes="], &["--lanes: the list is empty"]),
-        (&["study", "--scenes", "arch,,stack"], &["--scenes: a value between the commas is empty"]),
-        (&["verify", "--cases="], &["--cases: the list is empty"]),
-        (&["run", "arch", "--lanes="], &["--lanes: the value is empty"]),
-        (&["study", "--sweep", "contact-herz=30"], &["'contact_herz'", "'contact_hertz'", "mass_ratio"]),
-        (&["study", "--sweep", "dt="], &["list of values of dt is empty"]),
-        (&["study", "--sweep", "dt=5 furlongs"], &["'furlongs'", "ms"]),
-        (&["study", "--solvers", "pgs", "--sweep", "contact-hertz=30"], &["pgs", "soft_step"]),
-        (&["study", "--scenes", "arch", "--sweep", "mass-ratio=10"], &["'arch'", "mass_ratio"]),
-        (&["study", "--scenes", "mass_ratio", "--sweep", "mass-ratio=0"], &["'0'", "1 to 10000"]),
-        (&["run", "stack:2", "--substeps", "-1"], &["-1"]),
-        (&["run", "stack:2", "--substeps", "4.5"], &["4.5"]),
-        (
-            &["run", "stack:2", "--solver", "pgs", "--velocity-iterations", "0"],
-            &["velocity_iterations", "pgs"],
-        ),
-        (&["run", "stack:2", "--dt", "0"], &["dt", "0"]),
-        (&["run", "stack:2", "--dt", "-0.1"], &["dt", "-0.1"]),
-        (&["run", "stack:2", "--dt", "nan"], &["dt"]),
-        (&["run", "stack:2", "--steps", "0"], &["steps", "0"]),
-        (&["run", "stack:2", "--every", "0", "--state", "s.csv"], &["every", "0"]),
-        (&["run", "stack:2", "--every", "5"], &["every", "--state"]),
-        (&["run", "stack:2", "--state", "a.csv", "--contacts", "a.csv"], &["same file"]),
-        (
-            &["run", "stack:2", "--contacts", "a.csv", "--joints", "a.csv"],
-            &["--joints", "file as --contacts"],
-        ),
-        (&["run", "missing.json"], &["missing.json"]),
-        (&["run", "stack:2", "--state", "no/such/folder/s.csv"], &["no/such/folder/s.csv"]),
-        (&["run", "stack:2", "--statte", "s.csv"], &["--statte"]),
-        (&["study", "--scenes", "stack:2,pyramidd"], &["'pyramidd'", "'pyramid'"]),
-        (&["study", "--solvers", "pgs,sof_step"], &["'sof_step'", "'soft_step'"]),
-        (&["study", "--lanes", "1,2"], &["lanes", "'2'"]),
-        (&["study", "--substeps", "2,0"], &["substeps", "0"]),
-        (&["study", "--velocity-iterations", "0"], &["velocity_iterations", "0"]),
-        (&["study", "--scenes", "stack,stack:20"], &["scenes", "'stack:20'"]),
-        (&["study", "--repeats", "0"], &["repeats", "0"]),
-        (&["study", "--steps", "0"], &["steps", "0"]),
-        (&["study", "--tolerance", "penetration=5"], &["tolerance", "'5'", "unit"]),
-        (&["study", "--tolerance", "penetraton=5mm"], &["'penetraton'", "'penetration'"]),
-        (&["study", "--tolerance", "5mm"], &["tolerance", "'5mm'"]),
-        (&["studdy"], &["studdy"]),
+        ("run stack:2 --lanes 5", &["lanes", "5", "1, 4, 8, 16"]),
+        ("converge stack:2 --lanes 3", &["lanes", "3", "1, 4, 8, 16"]),
+        ("profile stack:2 --seconds nan", &["seconds", "NaN"]),
+        ("verify --cases B9.gapp", &["'B9.gapp'", "'B9.gap'"]),
+        ("verify --random dropz:17", &["'dropz'", "'drops'"]),
+        ("verify --random 0", &["--random", "'0'", "1000000"]),
+        ("verify --keep failed", &["--random"]),
+        ("verify --solvers pgs --without all", &["pgs", "shim"]),
+        ("torture", &["simpulse verify --random N"]),
+        ("completions tcsh", &["tcsh", "bash", "fish", "zsh"]),
+        ("scene", &["simpulse list SCENE"]),
+        ("list solvers --seed 2", &["seed", "solvers"]),
+        ("run stack:2 --order natral", &["'natral'", "'natural'", "colored"]),
+        ("run stack:2 --order natural --lanes 8", &["lanes", "8"]),
+        ("run stack:2 --substeps 0", &["substeps", "0"]),
+        ("run stack:2 --substeps 10001", &["substeps", "10001"]),
+        ("run stack:2 --solver soft_step --set contact_hertz=-3", &["contact_hertz", "-3"]),
+        ("study --set contact_hertz=nan", &["contact_hertz", "NaN"]),
+        ("--quick --scenes staack", &["unknown scene 'staack'", "'stack'"]),
+        ("study --scenes=", &["--scenes: the list is empty"]),
+        ("study --solvers=", &["--solvers: the list is empty"]),
+        ("study --lanes=", &["--lanes: the list is empty"]),
+        ("study --scenes arch,,stack", &["--scenes: a value between the commas is empty"]),
+        ("verify --cases=", &["--cases: the list is empty"]),
+        ("run arch --lanes=", &["--lanes: the value is empty"]),
+        ("study --sweep contact-herz=30", &["'contact_herz'", "'contact_hertz'", "mass_ratio"]),
+        ("study --sweep dt=", &["list of values of dt is empty"]),
+        ("study --sweep dt=5furlongs", &["'furlongs'", "ms"]),
+        ("study --solvers pgs --sweep contact-hertz=30", &["pgs", "soft_step"]),
+        ("study --scenes arch --sweep mass-ratio=10", &["'arch'", "mass_ratio"]),
+        ("study --scenes mass_ratio --sweep mass-ratio=0", &["'0'", "1 to 10000"]),
+        ("run stack:2 --substeps -1", &["-1"]),
+        ("run stack:2 --substeps 4.5", &["4.5"]),
+        ("run stack:2 --solver pgs --velocity-iterations 0", &["velocity_iterations", "pgs"]),
+        ("run stack:2 --dt 0", &["dt", "0"]),
+        ("run stack:2 --dt -0.1", &["dt", "-0.1"]),
+        ("run stack:2 --dt nan", &["dt"]),
+        ("run stack:2 --steps 0", &["steps", "0"]),
+        ("run stack:2 --every 0 --state s.csv", &["every", "0"]),
+        ("run stack:2 --every 5", &["every", "--state"]),
+        ("run stack:2 --state a.csv --contacts a.csv", &["same file"]),
+        ("run stack:2 --contacts a.csv --joints a.csv", &["--joints", "file as --contacts"]),
+        ("run missing.json", &["missing.json"]),
+        ("run stack:2 --state no/such/folder/s.csv", &["no/such/folder/s.csv"]),
+        ("run stack:2 --statte s.csv", &["--statte"]),
+        ("study --scenes stack:2,pyramidd", &["'pyramidd'", "'pyramid'"]),
+        ("study --solvers pgs,sof_step", &["'sof_step'", "'soft_step'"]),
+        ("study --lanes 1,2", &["lanes", "'2'"]),
+        ("study --substeps 2,0", &["substeps", "0"]),
+        ("study --velocity-iterations 0", &["velocity_iterations", "0"]),
+        ("study --scenes stack,stack:20", &["scenes", "'stack:20'"]),
+        ("study --repeats 0", &["repeats", "0"]),
+        ("study --steps 0", &["steps", "0"]),
+        ("study --tolerance penetration=5", &["tolerance", "'5'", "unit"]),
+        ("study --tolerance penetraton=5mm", &["'penetraton'", "'penetration'"]),
+        ("study --tolerance 5mm", &["tolerance", "'5mm'"]),
+        ("studdy", &["studdy"]),
     ];
     for (args, parts) in table {
         refused(folder.path(), args, parts);
@@ -180,8 +201,8 @@ fn bad_scene_files_are_refused_with_their_place() {
         std::fs::write(folder.path().join(name), content).unwrap();
     }
     for (name, _, part) in &files {
-        refused(folder.path(), &["run", name, "--state", "s.csv"], &[name, part]);
-        refused(folder.path(), &["study", "--scenes", name, "--quick"], &[name, part]);
+        refused(folder.path(), &format!("run {name} --state s.csv"), &[name, part]);
+        refused(folder.path(), &format!("study --scenes {name} --quick"), &[name, part]);
     }
 }
 
@@ -190,8 +211,8 @@ fn a_folder_that_cannot_be_written_is_refused_before_the_study() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("taken"), "").unwrap();
     // The default study would take much longer than this test is allowed to.
-    refused(folder.path(), &["study", "--out", "taken"], &["taken"]);
-    refused(folder.path(), &["study", "--out", "taken/below"], &["taken"]);
+    refused(folder.path(), "study --out taken", &["taken"]);
+    refused(folder.path(), "study --out taken/below", &["taken"]);
 }
 
 #[test]
@@ -201,7 +222,7 @@ fn a_run_that_diverges_says_where_and_when_and_writes_nothing() {
         {"type":"static","position":[0,0],"shapes":[{"circle":{"radius":1}}]},
         {"type":"dynamic","position":[5,0],"velocity":[200000,0],"shapes":[{"circle":{"radius":1}}]}]}"#;
     std::fs::write(folder.path().join("fast.json"), scene).unwrap();
-    let output = simpulse(folder.path(), &["run", "fast.json", "--state", "s.csv", "--every", "1"]);
+    let output = simpulse(folder.path(), "run fast.json --state s.csv --every 1");
     assert_eq!(output.status.code(), Some(1));
     let message = text(&output.stderr);
     assert!(
@@ -277,8 +298,7 @@ fn a_small_study_leaves_whole_files() {
 #[test]
 fn the_answer_comes_first_and_fills_a_page_at_most() {
     let folder = tempfile::tempdir().unwrap();
-    let args = ["--quick", "--scenes", "stack:3,bounce,arch", "--lanes", "8", "--verbose"];
-    let output = simpulse(folder.path(), &args);
+    let output = simpulse(folder.path(), "--quick --scenes stack:3,bounce,arch --lanes 8 --verbose");
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     assert!(errors(&output).is_empty(), "progress is for terminals: {}", text(&output.stderr));
     let (answer, tables) = text(&output.stdout).split_once("\nbudget: substeps").unwrap();
@@ -294,8 +314,9 @@ fn a_sweep_leaves_a_curve_per_solver() {
     let out = folder.path().join("o");
     std::fs::create_dir(&out).unwrap();
     std::fs::write(out.join("speed_vs_error.svg"), "of an earlier study").unwrap();
-    let args = ["--quick", "--scenes", "stack:3", "--solvers", "pgs,soft_step,tgs_soft", "--out", "o"];
-    let output = simpulse(folder.path(), &[&args[..], &["--sweep", "contact-hertz=60,15,30"]].concat());
+    let words =
+        "--quick --scenes stack:3 --solvers pgs,soft_step,tgs_soft --sweep contact-hertz=60,15,30 --out o";
+    let output = simpulse(folder.path(), words);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     assert_eq!(errors(&output), "skipped, without contact_hertz: pgs\n");
     let shown = text(&output.stdout);
@@ -320,7 +341,7 @@ fn a_sweep_leaves_a_curve_per_solver() {
     assert_eq!(runs, [(0.01, 500), (0.02, 250)]);
 
     // Repeating the sweep gives the same errors.
-    let compared = simpulse(folder.path(), &["compare", "o", "o", "--json"]);
+    let compared = simpulse(folder.path(), "compare o o --json");
     let compared: serde_json::Value = serde_json::from_slice(&compared.stdout).unwrap();
     assert_eq!(compared["pairs"].as_array().unwrap().len(), 6);
 }
@@ -350,7 +371,7 @@ fn every_csv_header_is_documented() {
         let documented = columns::SHEETS.iter().any(|sheet| sheet.documents(&names));
         assert!(documented, "{name}: {header}");
     }
-    let shown = simpulse(folder.path(), &["list", "columns"]);
+    let shown = simpulse(folder.path(), "list columns");
     assert!(
         text(&shown.stdout).contains("penetration_judged_m")
             && text(&shown.stdout).contains("tangent_impulse")
@@ -360,64 +381,60 @@ fn every_csv_header_is_documented() {
 #[test]
 fn data_is_printed_as_json_where_that_is_asked_for() {
     let folder = tempfile::tempdir().unwrap();
-    let json = |args: &[&str]| -> serde_json::Value {
-        let output = simpulse(folder.path(), args);
+    let json = |words: &str| -> serde_json::Value {
+        let output = simpulse(folder.path(), words);
         let shown = text(&output.stdout);
         serde_json::from_str(shown)
-            .unwrap_or_else(|e| panic!("{args:?}: {e}: {shown}{}", text(&output.stderr)))
+            .unwrap_or_else(|e| panic!("{words}: {e}: {shown}{}", text(&output.stderr)))
     };
-    assert_eq!(json(&["run", "stack:2", "--steps", "9", "--json"])["errors"]["steps"], 9);
-    assert_eq!(json(&["list", "solvers", "--json"]).as_array().unwrap().len(), VARIANTS.len());
-    assert_eq!(json(&["list", "arch", "--json"])["name"], "arch");
-    assert_eq!(json(&["list", "schema"])["title"], "simpulse scene");
-    assert!(json(&["list", "columns", "--json"])[0]["columns"].is_array());
-    assert!(json(&["list", "scenes", "--json"]).is_array());
-    assert!(json(&["verify", "--list", "--json"]).as_array().unwrap().len() > 50);
-    let cells = json(&["verify", "--cases", "A0", "--solvers", "pgs", "--json"]);
+    assert_eq!(json("run stack:2 --steps 9 --json")["errors"]["steps"], 9);
+    assert_eq!(json("list solvers --json").as_array().unwrap().len(), VARIANTS.len());
+    assert_eq!(json("list arch --json")["name"], "arch");
+    assert_eq!(json("list schema")["title"], "simpulse scene");
+    assert!(json("list columns --json")[0]["columns"].is_array());
+    assert!(json("list scenes --json").is_array());
+    assert!(json("verify --list --json").as_array().unwrap().len() > 50);
+    let cells = json("verify --cases A0 --solvers pgs --json");
     assert_eq!(cells["results"][0]["passed"], true);
-    let converge = ["converge", "stack:3", "--solvers", "pgs", "--repeats", "0", "--json"];
-    assert!(json(&converge)["gauss_seidel_rate"].as_f64().unwrap() < 1.0);
-    let frozen = json(&["converge", "stack:3", "--freeze", "s.frozen", "--json"]);
+    let converge = "converge stack:3 --solvers pgs --repeats 0 --json";
+    assert!(json(converge)["gauss_seidel_rate"].as_f64().unwrap() < 1.0);
+    let frozen = json("converge stack:3 --freeze s.frozen --json");
     assert!(frozen["certificate"].is_object(), "{frozen}");
-    let profile = ["profile", "stack:5", "--seconds", "0.2", "--settle", "3", "--json"];
-    assert!(json(&profile)["phases"][0]["limit"].is_string());
+    let profile = "profile stack:5 --seconds 0.2 --settle 3 --json";
+    assert!(json(profile)["phases"][0]["limit"].is_string());
     let features =
-        ["study", "--scenes", "stack:2", "--solvers", "pgs", "--features", "all", "--repeats", "1"];
-    let features = json(&[&features[..], &["--out", "features", "--json"]].concat());
+        json("study --scenes stack:2 --solvers pgs --features all --repeats 1 --out features --json");
     let records = features["records"].as_array().unwrap();
     let at = |i: usize, key: &str| records[i]["sample"]["load"][key].as_f64().unwrap();
     // A stack needs no restitution, and records with it are larger.
     assert!(records.len() == 2 && at(0, "bytes_per_contact") < at(1, "bytes_per_contact"));
     assert_eq!((at(0, "contacts"), &records[0]["errors"]), (at(1, "contacts"), &records[1]["errors"]));
-    let sizes = ["study", "--scenes", "stack", "--solvers", "pgs", "--sweep", "size=2,4", "--repeats", "1"];
-    let sizes = json(&[&sizes[..], &["--steps", "20", "--out", "sizes", "--json"]].concat());
+    let sizes =
+        json("study --scenes stack --solvers pgs --sweep size=2,4 --repeats 1 --steps 20 --out sizes --json");
     assert_eq!(sizes["records"][1]["bodies"].as_u64(), Some(5));
-    let advise = ["advise", "stack:3", "--max-penetration", "20mm", "--steps", "40", "--repeats", "1"];
-    let advise = [&advise[..], &["--solvers", "pgs,soft_step", "--json"]].concat();
-    assert!(json(&advise)["trials"].is_array());
-    let study = ["--quick", "--scenes", "stack:2", "--solvers", "pgs", "--lanes", "1", "--json"];
-    assert_eq!(json(&study)["records"].as_array().unwrap().len(), 3 * 2);
+    let advise =
+        "advise stack:3 --max-penetration 20mm --steps 40 --repeats 1 --solvers pgs,soft_step --json";
+    assert!(json(advise)["trials"].is_array());
+    let study = "--quick --scenes stack:2 --solvers pgs --lanes 1 --json";
+    assert_eq!(json(study)["records"].as_array().unwrap().len(), 3 * 2);
 }
 
 #[test]
 fn advice_ends_with_the_command_that_repeats_it() {
     let folder = tempfile::tempdir().unwrap();
-    let args =
-        ["advise", "stack:3", "--max-penetration", "20mm", "--steps", "40", "--repeats", "1", "--solvers"];
-    let output = simpulse(folder.path(), &[&args[..], &["soft_step"]].concat());
+    let words = "advise stack:3 --max-penetration 20mm --steps 40 --repeats 1 --solvers soft_step";
+    let output = simpulse(folder.path(), words);
     let last = text(&output.stdout).lines().last().unwrap();
     let command = last.strip_prefix("to run it: simpulse ").unwrap_or_else(|| panic!("{last}"));
-    let words: Vec<&str> = command.split(' ').collect();
-    let run = simpulse(folder.path(), &words);
-    assert_eq!(run.status.code(), Some(0), "{command}: {}", text(&run.stderr));
-    assert!(text(&run.stdout).contains("soft_step"), "{}", text(&run.stdout));
+    let run = succeeds(folder.path(), command);
+    assert!(run.contains("soft_step"), "{run}");
 }
 
 #[test]
 fn shells_complete_options_and_their_values() {
     let folder = tempfile::tempdir().unwrap();
     for shell in ["bash", "zsh", "fish"] {
-        let output = simpulse(folder.path(), &["completions", shell]);
+        let output = simpulse(folder.path(), &format!("completions {shell}"));
         let script = text(&output.stdout);
         for word in ["--solvers", "soft_step", "converge", "--freeze"] {
             let word = if shell == "fish" { word.trim_start_matches("--") } else { word };
@@ -531,7 +548,7 @@ fn a_run_writes_its_columns_at_the_steps_asked_for() {
 #[test]
 fn lists_and_scenes_are_printed() {
     let folder = tempfile::tempdir().unwrap();
-    let solvers = simpulse(folder.path(), &["list", "solvers"]);
+    let solvers = simpulse(folder.path(), "list solvers");
     let (list, parameters) = text(&solvers.stdout).split_once("\n\n").unwrap();
     assert_eq!(list.lines().count(), 1 + VARIANTS.len());
     for parameter in VARIANTS.iter().flat_map(|v| v.parameters) {
@@ -540,15 +557,15 @@ fn lists_and_scenes_are_printed() {
             "{parameter:?}"
         );
     }
-    let scenes = simpulse(folder.path(), &["list", "scenes"]);
+    let scenes = simpulse(folder.path(), "list scenes");
     assert_eq!(text(&scenes.stdout).lines().count(), simpulse::lab::scenes::CATALOG.len());
 
     // A printed scene can be read, and prints the same text again.
-    let printed = simpulse(folder.path(), &["list", "card_house", "--json"]).stdout;
+    let printed = simpulse(folder.path(), "list card_house --json").stdout;
     std::fs::write(folder.path().join("house.json"), &printed).unwrap();
-    assert_eq!(simpulse(folder.path(), &["list", "house.json", "--json"]).stdout, printed);
+    assert_eq!(simpulse(folder.path(), "list house.json --json").stdout, printed);
 
-    let help = simpulse(folder.path(), &["--help"]);
+    let help = simpulse(folder.path(), "--help");
     assert_eq!(help.status.code(), Some(0));
     assert!(text(&help.stdout).contains("Examples:"));
 }
@@ -562,7 +579,7 @@ fn the_default_study_names_scenes_that_exist() {
 #[test]
 fn a_scene_that_was_printed_falls_as_its_own_does() {
     let folder = tempfile::tempdir().unwrap();
-    let printed = simpulse(folder.path(), &["list", "stack:20", "--json"]).stdout;
+    let printed = simpulse(folder.path(), "list stack:20 --json").stdout;
     std::fs::write(folder.path().join("st.json"), &printed).unwrap();
     let run = |scene: &str| {
         let words = format!("run {scene} --solver pgs --steps 1200 --json");
@@ -586,13 +603,15 @@ fn a_scene_that_was_printed_falls_as_its_own_does() {
 #[test]
 fn what_a_solver_ignores_is_refused_with_who_has_it() {
     let folder = tempfile::tempdir().unwrap();
-    let relax = ["run", "stack:2", "--solver", "pgs", "--relax-iterations", "3"];
-    refused(folder.path(), &relax, &["--relax-iterations", "pgs", "soft_step"]);
-    let hertz = ["run", "stack:2", "--solver", "pgs", "--set", "contact_hertz=60"];
-    refused(folder.path(), &hertz, &["contact_hertz", "pgs", "soft_step"]);
+    let relax = "run stack:2 --solver pgs --relax-iterations 3";
+    refused(folder.path(), relax, &["--relax-iterations", "pgs", "soft_step"]);
+    let hertz = "run stack:2 --solver pgs --set contact_hertz=60";
+    refused(folder.path(), hertz, &["contact_hertz", "pgs", "soft_step"]);
     // If some solvers lack the parameter, a line names them.
-    let both = ["study", "--quick", "--scenes", "stack:2", "--solvers", "pgs,soft_step", "--lanes", "1"];
-    let output = simpulse(folder.path(), &[&both[..], &["--set", "contact_hertz=60"]].concat());
+    let output = simpulse(
+        folder.path(),
+        "study --quick --scenes stack:2 --solvers pgs,soft_step --lanes 1 --set contact_hertz=60",
+    );
     assert_eq!(errors(&output), "contact_hertz has no effect on pgs\n");
 }
 
@@ -603,18 +622,18 @@ fn a_part_that_is_missing_and_a_folder_in_use_are_refused() {
         let options = "--quick --scenes stack:2,stack:3,stack:4 --solvers pgs --lanes 1";
         succeeds(folder.path(), &format!("{options} --shard {i}/3 --out part-{i}"));
     }
-    refused(folder.path(), &["study", "--merge", "part-1", "part-3"], &["stack:3", "--partial"]);
+    refused(folder.path(), "study --merge part-1 part-3", &["stack:3", "--partial"]);
     succeeds(folder.path(), "study --merge part-1,part-2,part-3 --out whole");
 
     let lock = simpulse::lab::files::Lock::of(&folder.path().join("whole")).unwrap();
-    let args = ["--quick", "--scenes", "stack:2", "--solvers", "pgs", "--lanes", "1", "--out", "whole"];
-    refused(folder.path(), &args, &["whole", "another study"]);
+    let words = "--quick --scenes stack:2 --solvers pgs --lanes 1 --out whole";
+    refused(folder.path(), words, &["whole", "another study"]);
     drop(lock);
 
     // A folder of an older program version is rejected, and the version is named.
     std::fs::write(folder.path().join("whole/study.json"), r#"{"environment":{"version":"0.0.1"}}"#).unwrap();
-    refused(folder.path(), &["study", "--from", "whole"], &["schema version 1", "0.0.1"]);
-    refused(folder.path(), &["report", "whole"], &["simpulse study --from DIR"]);
+    refused(folder.path(), "study --from whole", &["schema version 1", "0.0.1"]);
+    refused(folder.path(), "report whole", &["simpulse study --from DIR"]);
 }
 
 /// Names and contents of a study's files that do not depend on times.
@@ -627,13 +646,11 @@ fn errors_of(folder: &Path) -> Vec<String> {
 fn no_study_is_overwritten() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    let args = ["--quick", "--solvers", "pgs", "--lanes", "1", "--out", "o", "--scenes"];
     let mut kept = Vec::new();
     for (i, scene) in ["stack:2", "stack:2", "stack:3"].into_iter().enumerate() {
-        let output = simpulse(path, &[&args[..], &[scene]].concat());
-        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        let told = succeeds(path, &format!("--quick --solvers pgs --lanes 1 --out o --scenes {scene}"));
         let said = format!("the study that was there is now in o/previous/{i}");
-        assert_eq!(text(&output.stdout).contains(&said), i > 0, "{}", text(&output.stdout));
+        assert_eq!(told.contains(&said), i > 0, "{told}");
         kept.push(std::fs::read(path.join("o/study.json")).unwrap());
     }
     for (i, bytes) in kept[..2].iter().enumerate() {
@@ -642,7 +659,7 @@ fn no_study_is_overwritten() {
         assert!(place.join("report.html").exists());
     }
     // A merge that is typed wrongly replaces nothing either.
-    let merged = simpulse(path, &["study", "--merge", "o", "--out", "o"]);
+    let merged = simpulse(path, "study --merge o --out o");
     assert!(text(&merged.stdout).contains("o/previous/3"), "{}", text(&merged.stderr));
 }
 
@@ -650,24 +667,18 @@ fn no_study_is_overwritten() {
 fn a_study_goes_on_where_it_stopped() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    let args =
-        ["--quick", "--solvers", "pgs", "--lanes", "1", "--scenes", "stack:2,stack:3,stack:4", "--out"];
-    let run = |more: &[&str]| simpulse(path, &[&args[..], more].concat());
-    assert_eq!(run(&["whole"]).status.code(), Some(0));
-    refused(path, &[&args[..], &["none", "--resume"]].concat(), &["none"]);
+    let study =
+        |out: &str| format!("--quick --solvers pgs --lanes 1 --scenes stack:2,stack:3,stack:4 --out {out}");
+    succeeds(path, &study("whole"));
+    refused(path, &study("none --resume"), &["none"]);
     // As if it had been stopped after the first scene.
     std::fs::create_dir(path.join("part")).unwrap();
     let mut part = StudyFile::read(&path.join("whole")).unwrap();
     part.records.retain(|r| r.scene == "stack:2");
     part.missing_scenes = vec!["stack:3".into(), "stack:4".into()];
     std::fs::write(path.join("part/study.json"), part.to_json().unwrap()).unwrap();
-    refused(
-        path,
-        &[&args[..], &["part", "--resume", "--repeats", "2"]].concat(),
-        &["repeats is 1 there, 2 here"],
-    );
-    let output = run(&["part", "--resume"]);
-    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    refused(path, &study("part --resume --repeats 2"), &["repeats is 1 there, 2 here"]);
+    succeeds(path, &study("part --resume"));
     assert_eq!(errors_of(&path.join("part")), errors_of(&path.join("whole")));
     let study = StudyFile::read(&path.join("part")).unwrap();
     assert!(study.missing_scenes.is_empty() && study.parts.len() == 2);
@@ -683,16 +694,8 @@ fn a_study_goes_on_where_it_stopped() {
 fn what_a_stopped_study_has_finished_stays() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    let args =
-        ["study", "--scenes", "stack:2,pyramid:60", "--solvers", "shim", "--steps", "60", "--out", "o"];
-    let mut run = Command::new(env!("CARGO_BIN_EXE_simpulse"));
-    let mut child = run.current_dir(path).args(args).stderr(std::process::Stdio::piped()).spawn().unwrap();
-    while !path.join("o/report.html").exists() && child.try_wait().unwrap().is_none() {
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
-    let pid = child.id().to_string();
-    assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
-    let output = child.wait_with_output().unwrap();
+    let study = "study --scenes stack:2,pyramid:60 --solvers shim --steps 60 --out o";
+    let output = interrupted(path, study, "-TERM", || path.join("o/report.html").exists());
     let message = text(&output.stderr);
     assert_eq!(
         (output.status.code(), message.contains("1 of 2 scenes are in o")),
