@@ -285,15 +285,8 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
         false => Found::default(),
     };
     let steps = plan.steps;
-    let mut results = StudyResults {
-        out: &args.out,
-        plan,
-        elsewhere,
-        earlier,
-        records: Vec::new(),
-        found,
-        kept: None,
-    };
+    let mut results =
+        StudyResults { out: &args.out, plan, elsewhere, earlier, records: Vec::new(), found, kept: None };
     // Before the folder is in use, so that a signal always has an answer.
     results.say(&results.plan.scenes);
     // Fail before the long computation, not after it.

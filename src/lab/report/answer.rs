@@ -365,7 +365,7 @@ fn accuracies(scenes: &[Answer], records: &[Record]) -> DocTable {
         let mut cells = vec![scene[0].scene.clone()];
         cells.extend(ErrorAxis::JUDGED.map(share));
         let [tight, exact] =
-            [Accuracy::Tight, Accuracy::Exact].map(|a| Answer::at(scene, a).and_then(|a| a.best()));
+            [Accuracy::Tight, Accuracy::Exact].map(|a| Answer::at(scene, a.share()).and_then(|a| a.best()));
         for (found, known) in [(tight, None), (exact, tight)] {
             match found {
                 Some(best) if known.is_some_and(|k| std::ptr::eq(k, best)) => {

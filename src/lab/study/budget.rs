@@ -1,6 +1,7 @@
 //! Budgets that a study tries, and checks for impossible budgets.
 
 use crate::engine::constraints::Impacts;
+use crate::engine::narrowphase::frozen::Freezing;
 use crate::engine::params::Budget;
 use crate::engine::solvers::{VARIANTS, Variant};
 use crate::lab::error::Error;
@@ -140,12 +141,17 @@ pub fn brief(budget: &Budget, variant: &Variant) -> String {
     text
 }
 
-/// Appends the treatment of impacts, unless it is the solver's own.
-pub fn with_impacts(text: String, impacts: Impacts) -> String {
-    match impacts {
+/// Appends the treatment of impacts and of frozen contacts, unless they are the solver's own.
+pub fn with_treatments(text: String, impacts: Impacts, frozen: Freezing) -> String {
+    let text = match impacts {
         Impacts::Own => text,
         Impacts::Waves => text + " waves",
         Impacts::None => text + " no impacts",
+    };
+    match frozen {
+        Freezing::Own => text,
+        Freezing::Off => text + " fresh",
+        Freezing::Within(_) => format!("{text} frozen {frozen}"),
     }
 }
 
