@@ -1,5 +1,6 @@
 //! Results of a study: one record per setting, and the records on the Pareto fronts.
 
+use super::budget;
 use super::class::SceneClass;
 use super::curve::ErrorAxis;
 use super::pareto::{self, TimeAndError};
@@ -200,13 +201,8 @@ impl Record {
         };
         text += &format!(" --substeps {}", self.budget.substeps);
         if let Ok(solver) = find(self.solver) {
-            let fields = [
-                ("velocity", self.budget.velocity_iterations, solver.uses.velocity),
-                ("relax", self.budget.relax_iterations, solver.uses.relax),
-                ("position", self.budget.position_iterations, solver.uses.position),
-            ];
-            let used = fields.into_iter().filter(|f| f.2);
-            text += &used.map(|(name, n, _)| format!(" --{name}-iterations {n}")).collect::<String>();
+            let kinds = budget::kinds(&self.budget, solver);
+            text += &kinds.map(|(name, n)| format!(" --{name}-iterations {n}")).collect::<String>();
             let own = overrides::of_words(solver, &self.parameters).unwrap_or_else(|_| solver.defaults());
             for word in overrides::changed(solver, &own).split_whitespace() {
                 text += &format!(" --set {word}");
