@@ -5,13 +5,14 @@ use super::progress::Bar;
 use super::run::{RunArgs, how, settings};
 use super::values::{self, SettingArgs};
 use crate::engine::solvers::Variant;
+use crate::engine::world::World;
 use crate::lab::error::Error;
 use crate::lab::files::Pending;
 use crate::lab::recording::page::{MOST, RecordingPanel, page};
-use crate::lab::recording::record::{Caption, Recorder};
+use crate::lab::recording::record::{Caption, record_trial};
 use crate::lab::report::style::Style;
-use crate::lab::scenes::holds::HoldWatch;
 use crate::lab::study::open_scene;
+use crate::lab::trial::Trial;
 use clap::Args;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -48,14 +49,15 @@ pub fn run(args: &RunArgs, path: &Path) -> Result<ExitCode, Error> {
     let mut file = Pending::new(path)?;
     let (mut panels, mut text) = (Vec::new(), String::new());
     for own in chosen {
-        let mut world = scene.build(own)?;
-        let solver = world.settings.solver.name;
-        let caption = Caption { scene: scene.name.clone(), solver: solver.into(), setting: how(&world) };
-        let recorder = Recorder::new(&world, caption, args.every.unwrap_or(1), *record_contacts);
-        let watch = HoldWatch::new(&world, loaded.demands.clone());
+        let solver = own.solver.name;
+        let name = &scene.name;
+        let caption =
+            |world: &World| Caption { scene: name.clone(), solver: solver.into(), setting: how(world) };
         let bar = Bar::new();
-        let after = |step: u32| bar.step(step as usize, scene.steps as usize, "steps");
-        let (bytes, header) = recorder.run(&mut world, watch, scene.steps, after)?;
+        let mut after = |step: u64| bar.step(step as usize, scene.steps as usize, "steps");
+        let trial = Trial { demands: loaded.demands.clone(), ..Trial::new(scene, own) };
+        let every = args.every.unwrap_or(1);
+        let (bytes, header) = record_trial(trial, &caption, every, *record_contacts, &mut after)?;
         text += &format!("{}: {solver}, {}: {}\n", header.scene, header.setting, header.outcome);
         panels.push(RecordingPanel { bytes, header, color: Style::of(solver).color.to_string() });
     }

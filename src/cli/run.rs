@@ -344,7 +344,7 @@ pub(super) fn how(world: &World) -> String {
         Order::Colored => lanes(world.lane_width().lanes()),
         order => format!("{} order", order.name()),
     };
-    format!("{}, {order}", budget::with_impacts(budget::brief(&s.budget, s.solver), s.impacts))
+    format!("{}, {order}", budget::with_treatments(budget::brief(&s.budget, s.solver), s.impacts, s.frozen))
 }
 
 fn head(world: &World, scene: &Scene) -> String {

@@ -6,12 +6,13 @@ use super::progress::Bar;
 use super::values::{self, Solvers};
 use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
+use crate::engine::narrowphase::frozen::Freezing;
 use crate::engine::solvers::Variant;
 use crate::engine::world::Order;
 use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::overrides::{self, Override};
-use crate::lab::report::study_file::StudyFile;
+use crate::lab::report::study_file::{StudyFile, differing_settings};
 use crate::lab::report::{self, answer, by_scene, html, sweep};
 use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::study::budget::BudgetGrid;
@@ -21,8 +22,6 @@ use crate::lab::study::{self, Progress, Record, StudyPlan, telling};
 use crate::lab::units::quantity;
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
-use serde_json::Value;
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
@@ -52,6 +51,7 @@ Examples:
   simpulse study --from results                      the page again, with verify.json of the folder
   simpulse study --scenes stack:20,my.json --velocity-iterations 4,16,64 --out results/stack
   simpulse study --scenes my.json --solvers all --thorough --out results/my
+  simpulse study --scenes stack:20,arch --frozen off --frozen own --frozen 1mm,0.004,loaded --out results/frozen
   simpulse study --scenes pyramid:20 --standard --orders natural,reversed,shuffled,colored --out results/orders";
 
 /// Lists are separated by commas.
@@ -74,6 +74,10 @@ pub struct StudyArgs {
     /// Scenes where nothing bounces run the first one only [default: own,waves; in a sweep own]
     #[arg(long, value_delimiter = ',', value_name = "TREATMENT,…", value_parser = values::impacts())]
     pub impacts: Vec<Impacts>,
+    /// Frozen contacts, the option once for each: own is the solver's, off is never, DISTANCE,TURN within such a motion
+    /// (1mm,0.004), and DISTANCE,TURN,loaded only where both points of a contact bear load [default: own]
+    #[arg(long, value_name = "LIMITS", value_parser = values::frozen)]
+    pub frozen: Vec<Freezing>,
     /// Substeps to try
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     pub substeps: Vec<u32>,
@@ -169,6 +173,7 @@ impl StudyArgs {
                 (true, true) => vec![Impacts::Own],
                 (true, false) => base.impacts,
             },
+            frozen: if self.frozen.is_empty() { base.frozen } else { unique(&self.frozen) },
             budgets: BudgetGrid {
                 substeps: self.substeps.clone(),
                 velocity_iterations: self.velocity_iterations.clone(),
@@ -258,8 +263,12 @@ impl Shard {
 /// Runs the command.
 pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     if let Some(folder) = &args.from {
-        let page = html::write(folder, &StudyFile::read(folder)?)?;
-        return print(&format!("wrote {}\n", page.display()));
+        let study = StudyFile::read(folder)?;
+        let page = html::write(folder, &study)?;
+        return match args.json {
+            true => print(&String::from_utf8_lossy(&study.to_json()?)),
+            false => print(&format!("wrote {}\n", page.display())),
+        };
     }
     if !args.merge.is_empty() {
         return merge(args);
@@ -276,6 +285,9 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     plan.check()?;
     let not_held: String = plan.not_held()?.iter().map(|line| format!("skipped: {line}\n")).collect();
     note(&(without + &overrides::partly(&plan.solvers, &plan.overrides) + &not_held));
+    // Fail before the long computation, not after it.
+    files::prepare_folder(&args.out)?;
+    let lock = files::Lock::of(&args.out)?;
     let found_out: String =
         plan.find_out()?.iter().map(|line| answer::wrapped(&format!("{line}\n"))).collect();
     let earlier = if args.resume { Some(earlier(&args.out, &plan)?) } else { None };
@@ -284,14 +296,10 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
         true => Found::of_csv(&std::fs::read_to_string(&list).map_err(Error::io(&list))?)?,
         false => Found::default(),
     };
-    let steps = plan.steps;
     let mut results =
         StudyResults { out: &args.out, plan, elsewhere, earlier, records: Vec::new(), found, kept: None };
     // Before the folder is in use, so that a signal always has an answer.
     results.say(&results.plan.scenes);
-    // Fail before the long computation, not after it.
-    files::prepare_folder(&args.out)?;
-    let lock = files::Lock::of(&args.out)?;
     let bar = Bar::new();
     let study = results.run(&|p| bar.show(p.done, p.total, p.what))?;
     drop(bar);
@@ -305,7 +313,7 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     if args.json {
         return print(&String::from_utf8_lossy(&study.to_json()?));
     }
-    print(&(found_out + &text(&study, steps, &args.out, &paths, args.verbose) + &kept_note(&results.kept)))
+    print(&(found_out + &text(&study, &args.out, &paths, args.verbose) + &kept_note(&results.kept)))
 }
 
 /// The folder of a running study.
@@ -386,18 +394,10 @@ fn kept_note(kept: &Option<PathBuf>) -> String {
 /// The study in a folder, to go on with. Errors: none there; a study with other settings.
 fn earlier(out: &Path, plan: &StudyPlan) -> Result<StudyFile, Error> {
     let earlier = StudyFile::read(out)?;
-    let own = report::export::settings(plan);
-    let [there, here] =
-        [&earlier.settings, &own].map(|settings| settings.as_object().cloned().unwrap_or_default());
-    let short = |value: Option<&Value>| {
-        let text = value.map_or("–".to_string(), Value::to_string);
-        if text.chars().count() > 80 { "…".to_string() } else { text }
-    };
-    let differs = |name: &&String| *name != "budget_search" && there.get(*name) != here.get(*name);
-    let names: BTreeSet<&String> = there.keys().chain(here.keys()).filter(differs).collect();
-    let list: Vec<String> = names
+    let list: Vec<String> = differing_settings(&earlier.settings, &report::export::settings(plan))
         .into_iter()
-        .map(|name| format!("{name} is {} there, {} here", short(there.get(name)), short(here.get(name))))
+        .filter(|(name, _)| name != "budget_search")
+        .map(|(name, [there, here])| format!("{name} is {there} there, {here} here"))
         .collect();
     match list.is_empty() {
         true => Ok(earlier),
@@ -426,8 +426,7 @@ fn merge(args: &StudyArgs) -> Result<ExitCode, Error> {
     if args.json {
         return print(&String::from_utf8_lossy(&whole.to_json()?));
     }
-    let steps = whole.settings["steps"].as_u64().map(|steps| steps as u32);
-    print(&(text(&whole, steps, &args.out, &paths, args.verbose) + &kept_note(&kept)))
+    print(&(text(&whole, &args.out, &paths, args.verbose) + &kept_note(&kept)))
 }
 
 /// Drops solvers that do not have the swept quantity, and returns a message about them.
@@ -446,18 +445,15 @@ fn keep_concerned(sweep: &QuantitySweep, solvers: &mut Vec<&'static Variant>) ->
 }
 
 /// The answer or, for a sweep, its curves as text; then the list of written files.
-fn text(study: &StudyFile, steps: Option<u32>, out: &Path, paths: &[PathBuf], verbose: bool) -> String {
+fn text(study: &StudyFile, out: &Path, paths: &[PathBuf], verbose: bool) -> String {
     let answer = match sweep::is_sweep(&study.records) {
         true => sweep::text(&study.records, &study.environment),
-        false => answer::text(&study.records, &study.environment, steps),
+        false => answer::text(&study.records, &study.environment, study.steps()),
     };
-    let mut text = answer::wrapped(&study.caution())
-        + &answer
-        + &answer::wrapped(&study.budgets())
-        + &by_scene::order_tables(&study.records)
-            .iter()
-            .map(|t| format!("\n{}", t.text()))
-            .collect::<String>();
+    let mut text = answer::wrapped(&study.caution()) + &answer + &answer::wrapped(&study.budgets());
+    let mut tables = by_scene::order_tables(&study.records);
+    tables.extend(by_scene::frozen_table(&study.records));
+    text += &tables.iter().map(|t| format!("\n{}", t.text())).collect::<String>();
     let names: Vec<String> =
         paths.iter().filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned())).collect();
     text += &answer::wrapped(&format!("\nwrote {} in {}\n", names.join(", "), out.display()));

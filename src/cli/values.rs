@@ -161,7 +161,7 @@ pub struct FrozenArgs {
 }
 
 /// The parser of `--frozen`. Errors: a word that is none of them, a distance or turn that is not positive.
-fn frozen(text: &str) -> Result<Freezing, Error> {
+pub(super) fn frozen(text: &str) -> Result<Freezing, Error> {
     let refused = |why: &str| Error::invalid("frozen", format!("'{text}' {why}"));
     let positive = |what: &str, text: &str, unit: &str| {
         let value = quantity("frozen", text, unit)?;

@@ -83,6 +83,19 @@ impl Freezing {
     }
 }
 
+/// As on the command line: own, off, or distance (m) and turn (rad).
+impl std::fmt::Display for Freezing {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Freezing::Own => write!(f, "own"),
+            Freezing::Off => write!(f, "off"),
+            Freezing::Within(FreezeLimits { distance, turn, loaded_only }) => {
+                write!(f, "{distance},{turn}{}", if *loaded_only { ",loaded" } else { "" })
+            }
+        }
+    }
+}
+
 /// Kinds of pairs whose contacts are frozen.
 const KINDS: [PairKind; 2] = [PairKind::Rectangles, PairKind::Hulls];
 

@@ -78,7 +78,7 @@ pub const METRICS: &[Metric] = &[
     always(
         "residual_rms_lighter_weights",
         "1",
-        "residual of the rigid contact law, rms, each point over weight of its lighter body × step",
+        "residual of the rigid contact law, rms, each point over weight of its lighter body × step, without the first step",
         |o| match o.lighter.count {
             0 => ratio(o.residual_rms(), o.body_unit()),
             _ => o.lighter.rms(),

@@ -9,7 +9,7 @@ use crate::lab::error::Error;
 use crate::lab::metrics::Observation;
 use crate::lab::metrics::overlaps::Overlaps;
 use crate::lab::picture::frame::{Frame, Stage, TouchPoint};
-use crate::lab::scenes::holds::HoldWatch;
+use crate::lab::trial::Trial;
 
 /// Minimum number of units in half the width of the thinnest moving shape, and in the weight of the lightest body
 /// over a step.
@@ -141,31 +141,6 @@ impl Recorder {
         self.last = [poses, points];
     }
 
-    /// Takes `steps` steps, calls `after` with the number of each, and returns the file and its header. A run
-    /// that diverges is recorded up to there. Errors: the recording has become too large.
-    pub fn run(
-        mut self,
-        world: &mut World,
-        mut watch: HoldWatch,
-        steps: u32,
-        mut after: impl FnMut(u32),
-    ) -> Result<(Vec<u8>, Header), Error> {
-        let mut outcome = None;
-        for step in 1..=steps {
-            if let Err(divergence) = world.step() {
-                outcome = Some(format!("blew up at step {}", divergence.step));
-                break;
-            }
-            watch.observe(world);
-            self.add(world)?;
-            after(step);
-        }
-        let of_watch = || watch.broken().map_or("holds".to_string(), |broken| broken.to_string());
-        let outcome = outcome.unwrap_or_else(of_watch);
-        let header = Header { outcome: outcome.clone(), ..self.recording.header.clone() };
-        Ok((self.finish(&outcome)?, header))
-    }
-
     /// The file; `outcome` describes how the run ended.
     pub fn finish(mut self, outcome: &str) -> Result<Vec<u8>, Error> {
         self.recording.header.outcome = outcome.to_string();
@@ -173,6 +148,34 @@ impl Recorder {
             serde_json::to_vec(&self.recording).map_err(|e| Error::invalid("record", e.to_string()))?;
         Ok(miniz_oxide::deflate::compress_to_vec_zlib(&text, 7))
     }
+}
+
+/// Runs a trial without measuring it, calls `after` with the number of each step, and returns the file and its header;
+/// see [`Recorder::new`]. A run that diverges is recorded up to there.
+///
+/// Errors: those of the trial; the recording has become too large.
+pub fn record_trial(
+    trial: Trial,
+    caption: &dyn Fn(&World) -> Caption,
+    every: u32,
+    contacts: bool,
+    after: &mut dyn FnMut(u64),
+) -> Result<(Vec<u8>, Header), Error> {
+    let mut recorder: Option<Recorder> = None;
+    let found = Trial { measured: 0, ..trial }.run(&mut |world| {
+        match &mut recorder {
+            Some(recorder) => recorder.add(world)?,
+            None => recorder = Some(Recorder::new(world, caption(world), every, contacts)),
+        }
+        after(world.step_index);
+        Ok(())
+    })?;
+    let blew_up = found.failure.map(|d| format!("blew up at step {}", d.step));
+    let outcome = blew_up.or(found.broken.map(|b| b.to_string())).unwrap_or("holds".into());
+    let recorder =
+        recorder.unwrap_or_else(|| Recorder::new(&found.world, caption(&found.world), every, contacts));
+    let header = Header { outcome: outcome.clone(), ..recorder.recording.header.clone() };
+    Ok((recorder.finish(&outcome)?, header))
 }
 
 /// The largest power of ten of which `size` has [`FINENESS`].

@@ -10,6 +10,7 @@ use crate::lab::scenes::CATALOG;
 use crate::lab::scenes::holds::HORIZON;
 use crate::lab::scenes::tolerance::Accuracy;
 use crate::lab::study::answer::{Answer, fails_last, order, same};
+use crate::lab::study::class::SceneClass;
 use crate::lab::study::compare::Ratio;
 use crate::lab::study::curve::{ErrorAxis, solvers_of};
 use crate::lab::study::ranking::{Ranking, Standing, ranking};
@@ -67,7 +68,7 @@ fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> Strin
     match (ranking.leader(), &all[..]) {
         (Some(first), _) => {
             text += &format!(
-                "{} {}: good enough on {} of {scenes} scenes, at {}. This also holds with any one scene left out, and with half or twice the tolerances.",
+                "{} {}: good enough on {} of {scenes} scenes, at {}. This also holds with any one scene or class of scenes left out, and with half or twice the tolerances.",
                 if steps.is_some() { "First is" } else { "Use" },
                 first.solver,
                 first.good[0],
@@ -98,9 +99,20 @@ fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> Strin
     }
     if ranking.leader().is_none() && ranking.first.len() > 1 {
         text += &format!(
-            "  By speed there is no clear leader: with a scene left out or other tolerances, first is one of {}.",
+            "  By speed there is no clear leader: with a scene or class left out or other tolerances, first is one of {}.",
             short_list(&ranking.first, 6)
         );
+    }
+    let words = ["stay where they are placed at rest", "arrive at rest", "need not come to rest"];
+    let classes = words.iter().zip(&ranking.first_in).filter(|(_, first)| !first.is_empty());
+    let classes: Vec<String> = classes
+        .map(|(words, first)| match &first[..] {
+            [only] => format!("{only} leads where bodies {words}"),
+            several => format!("one of {} where they {words}", short_list(several, 3)),
+        })
+        .collect();
+    if classes.len() > 1 {
+        text += &format!("  By class of scenes: {}.", classes.join("; "));
     }
     if let Some(place) = standings.iter().position(|s| s.solver == DEFAULT) {
         let own = &standings[place];
@@ -365,7 +377,7 @@ fn accuracies(scenes: &[Answer], records: &[Record]) -> DocTable {
         let mut cells = vec![scene[0].scene.clone()];
         cells.extend(ErrorAxis::JUDGED.map(share));
         let [tight, exact] =
-            [Accuracy::Tight, Accuracy::Exact].map(|a| Answer::at(scene, a).and_then(|a| a.best()));
+            [Accuracy::Tight, Accuracy::Exact].map(|a| Answer::at(scene, a.share()).and_then(|a| a.best()));
         for (found, known) in [(tight, None), (exact, tight)] {
             match found {
                 Some(best) if known.is_some_and(|k| std::ptr::eq(k, best)) => {
@@ -386,14 +398,20 @@ fn accuracies(scenes: &[Answer], records: &[Record]) -> DocTable {
 fn standings(ranking: &Ranking, scenes: usize) -> DocTable {
     const CAPTION: &str = "\
 Ranking over all scenes. score: time of the fastest solver ÷ time of this one, each at its cheapest good-enough setting, \
-averaged over scenes (0 where it is not good enough); range: with any scene left out, and with half or twice the tolerances";
-    let head = ["solver", "score", "range", "plausible", "tight", "exact", "fastest or tied", "fails on"];
-    let mut rows = DocTable { most: MOST_RANKED, ..DocTable::new(CAPTION, 1, &head) };
+averaged over scenes (0 where it is not good enough); range: with any scene or class left out, and with half or twice the \
+tolerances; placed, arrives, moves: score where bodies start at rest, come to rest, or need not; then numbers of scenes";
+    let [placed, arrives, moves] = SceneClass::ALL.map(SceneClass::word);
+    let [plausible, tight, exact] = Accuracy::ALL.map(Accuracy::word);
+    let head =
+        ["solver", "score", "range", placed, arrives, moves, plausible, tight, exact, "fastest", "fails on"];
+    let caption = format!("{CAPTION}, of {scenes}");
+    let mut rows = DocTable { most: MOST_RANKED, ..DocTable::new(caption, 1, &head) };
     for own in &ranking.standings {
         let [low, high] = own.range;
         let mut cells = vec![DocCell::solver(own.solver)];
         cells.extend([format!("{:.2}", own.score), format!("{low:.2}–{high:.2}")].map(DocCell::from));
-        cells.extend(own.good.into_iter().chain([own.fastest]).map(|n| format!("{n} of {scenes}").into()));
+        cells.extend(own.by_class.map(|score| score.map_or("–".into(), |s| format!("{s:.2}")).into()));
+        cells.extend(own.good.into_iter().chain([own.fastest]).map(|n| n.to_string().into()));
         let fails = if own.fails_on.is_empty() { "–".into() } else { short_list(&own.fails_on, 2) };
         cells.push(DocCell { title: own.fails_on.join(", "), ..fails.into() });
         rows.row(cells);
@@ -542,13 +560,15 @@ mod tests {
     fn the_page_stays_a_page_and_says_what_did_not_run() {
         let of = |scene: &str, solver| Record { scene: scene.to_string(), solver, ..record(8, 1, 5.0, 1e-3) };
         let all = |solvers: &[&'static str]| -> Vec<Record> {
-            (0..11).flat_map(|i| solvers.iter().map(move |s| of(&format!("scene:{i}"), *s))).collect()
+            (0..study::DEFAULT_SCENES.len())
+                .flat_map(|i| solvers.iter().map(move |s| of(&format!("scene:{i}"), *s)))
+                .collect()
         };
         let every: Vec<&'static str> = VARIANTS.iter().map(|v| v.name).collect();
         for solvers in [&study::DEFAULT_SOLVERS[..], &every] {
             let text = page(&all(solvers));
             // A study adds two lines: the list of files.
-            assert!(text.lines().count() <= 58, "{text}");
+            assert!(text.lines().count() <= 66, "{text}");
             assert!(text.lines().all(|l| l.chars().count() <= PAGE_WIDTH), "{text}");
             let left_out = text.split_once("left out").map_or("", |(_, names)| names);
             for name in every.iter().filter(|name| !solvers.contains(name)) {

@@ -4,6 +4,7 @@ use super::doc::{DocCell, DocTable, Tone};
 use super::units::{bodies, digits, is_emulated, ratio, si};
 use crate::engine::world::Order;
 use crate::lab::metrics::Errors;
+use crate::lab::scenes::tolerance::Accuracy;
 use crate::lab::study::curve::{ErrorAxis, solvers_of};
 use crate::lab::study::profile::Profile;
 use crate::lab::study::{Fronts, Record, TruthError, answer};
@@ -195,6 +196,86 @@ least one solver solves";
     rows
 }
 
+/// What treatments of impacts and of frozen contacts gain and cost each solver: a table for each that took several
+/// values.
+pub fn treatment_tables(records: &[Record]) -> Vec<DocTable> {
+    let impacts = treatments("impacts", records, |r| r.impacts.name().to_string());
+    impacts.into_iter().chain(frozen_table(records)).collect()
+}
+
+/// That of frozen contacts.
+pub fn frozen_table(records: &[Record]) -> Option<DocTable> {
+    treatments("frozen contacts", records, |r| match r.frozen.to_string() {
+        limits if limits == "off" => "fresh".to_string(),
+        limits => limits,
+    })
+}
+
+/// Such a table; a line per solver and value. Scenes on which a solver ran with one value only are left out.
+fn treatments(name: &str, records: &[Record], of: impl Fn(&Record) -> String) -> Option<DocTable> {
+    let values_of = |records: &mut dyn Iterator<Item = &Record>| {
+        let mut values: Vec<String> = records.map(&of).collect();
+        let mut kept = Vec::new();
+        values.retain(|value| {
+            !kept.contains(value) && {
+                kept.push(value.clone());
+                true
+            }
+        });
+        kept
+    };
+    let caption = format!(
+        "What {name} gain and cost: scenes on which the solver is good enough, and on which it is so (+) or not (−) only \
+         with them; time: of its cheapest good setting over that of its first line, geometric mean"
+    );
+    let mut rows = DocTable {
+        wide: true,
+        ..DocTable::new(caption, 2, &["solver", name, "plausible", "tight", "time", "+", "−"])
+    };
+    for solver in solvers_of(records) {
+        let own = |r: &&Record| r.solver == solver;
+        let values = values_of(&mut records.iter().filter(own));
+        let scenes: Vec<&[Record]> = records
+            .chunk_by(|a, b| a.scene == b.scene)
+            .filter(|scene| values_of(&mut scene.iter().filter(own)).len() > 1)
+            .collect();
+        let Some(first) = values.first().filter(|_| !scenes.is_empty()) else { continue };
+        // The time of the cheapest setting that is good enough (ns), infinite without one.
+        let best = |scene: &[Record], value: &String, accuracy: Accuracy| {
+            let good = scene.iter().filter(own).filter(|r| of(r) == *value && r.is_good(accuracy));
+            good.map(Record::cost_ns).fold(f64::INFINITY, f64::min)
+        };
+        for value in &values {
+            let count = |accuracy| scenes.iter().filter(|s| best(s, value, accuracy).is_finite()).count();
+            let pairs: Vec<(&str, [f64; 2])> = scenes
+                .iter()
+                .map(|s| (s[0].scene.as_str(), [first, value].map(|v| best(s, v, Accuracy::Plausible))))
+                .collect();
+            let names = |own: usize| {
+                let only = pairs.iter().filter(|p| p.1[own].is_finite() && p.1[1 - own].is_infinite());
+                only.map(|p| p.0).collect::<Vec<_>>().join(", ")
+            };
+            let logs: Vec<f64> =
+                pairs.iter().map(|p| (p.1[1] / p.1[0]).ln()).filter(|log| log.is_finite()).collect();
+            let time = (logs.iter().sum::<f64>() / logs.len() as f64).exp();
+            let of_scenes = |n: usize| format!("{n} of {}", scenes.len());
+            let time = if time.is_finite() { format!("{time:.2}") } else { "–".into() };
+            let cells = [
+                value.clone(),
+                of_scenes(count(Accuracy::Plausible)),
+                of_scenes(count(Accuracy::Tight)),
+                time,
+            ];
+            rows.row(
+                [DocCell::solver(solver)]
+                    .into_iter()
+                    .chain(cells.into_iter().chain([names(1), names(0)]).map(DocCell::from)),
+            );
+        }
+    }
+    (!rows.rows.is_empty()).then_some(rows)
+}
+
 /// Stability against the order of contacts: a table per scene with a line per solver. Empty unless orders other than
 /// natural and colored ran.
 pub fn order_tables(records: &[Record]) -> Vec<DocTable> {
@@ -251,6 +332,7 @@ fn in_order(scene: &[Record], solver: &str, order: Order) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::narrowphase::frozen::Freezing;
     use crate::lab::study::record::tests::{failed, fell, record};
 
     #[test]
@@ -293,6 +375,28 @@ mod tests {
         assert_eq!(line(&records), format!("pgs {natural} 1 of 2, 4.00 mm, 0e0 1 of 1, 3.00 mm, 0e0"));
         records.retain(|r| r.order != Order::Reversed);
         assert!(order_tables(&records).is_empty());
+    }
+
+    #[test]
+    fn frozen_contacts_gain_scenes_and_cost_time() {
+        let on = |scene: &str, frozen, record: Record| Record { scene: scene.into(), frozen, ..record };
+        let records = [
+            on("x", Freezing::Off, fell(8, 1, 1.0, 0.0)),
+            on("x", Freezing::Own, record(8, 1, 1.0, 9e-3)),
+            on("y", Freezing::Off, record(8, 1, 10.0, 1e-4)),
+            on("y", Freezing::Own, record(8, 1, 15.0, 1e-4)),
+            // With one treatment only.
+            on("z", Freezing::Off, record(8, 1, 10.0, 1e-4)),
+        ];
+        let tables = treatment_tables(&records);
+        assert_eq!(tables.len(), 1);
+        let text = tables[0].text();
+        let line = |start: &str| {
+            text.lines().find(|l| l.contains(start)).unwrap().split_whitespace().collect::<Vec<_>>().join(" ")
+        };
+        assert_eq!(line(" fresh"), "pgs fresh 1 of 2 1 of 2 1.00");
+        assert_eq!(line(" own"), "pgs own 2 of 2 1 of 2 1.50 x");
+        assert!(treatment_tables(&records[..1]).is_empty());
     }
 
     #[test]

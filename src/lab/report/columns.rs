@@ -82,6 +82,7 @@ const SETTING: &[(Column, StudyCell)] = &[
     }),
     cell("scene", "", "name with its size", |r, _| r.scene.as_str().into()),
     cell("bodies", "", "bodies of the scene", |r, _| r.bodies.into()),
+    cell("class", "", "placed at rest, arrives at rest, or moves", |r, _| r.class.word().into()),
     cell("dt_s", "s", "length of a step", |r, _| r.dt.into()),
     cell("solver", "", "name of the solver", |r, _| r.solver.into()),
     cell("order", "", "constraint order: natural, reversed, shuffled or colored", |r, _| {
@@ -100,6 +101,9 @@ const SETTING: &[(Column, StudyCell)] = &[
         r.budget.position_iterations.into()
     }),
     cell("impacts", "", "treatment of impacts: own, waves or none", |r, _| r.impacts.name().into()),
+    cell("frozen", "", "frozen contacts: own, off, or distance (m) and turn (rad)", |r, _| {
+        r.frozen.to_string().into()
+    }),
     cell("parameters", "", "all parameters of the solver, name=value", |r, _| r.parameters.as_str().into()),
     cell("swept", "", "quantity that a sweep varies; empty without --sweep", |r, _| {
         r.swept.map(|s| s.name).into()

@@ -47,6 +47,7 @@ pub fn settings(plan: &StudyPlan) -> Value {
         "lanes": plan.widths.iter().map(|w| w.lanes()).collect::<Vec<_>>(),
         "orders": plan.orders,
         "impacts": plan.impacts,
+        "frozen": plan.frozen.iter().map(ToString::to_string).collect::<Vec<_>>(),
         "budgets": plan.budgets,
         "budget_search": plan.searched().then(|| json!({"rule": search::rule(), "not_searched": plan.not_searched()})),
         "steps": plan.steps,

@@ -32,8 +32,7 @@ const SWEEP: &str = "sweep.svg";
 const SPEED: &str = "speed_vs_error.svg";
 
 /// Files of a study, besides its recordings.
-const FILES: [&str; 8] =
-    [SWEEP, SPEED, "profiles.svg", "tables.txt", "study.csv", study_file::NAME, found::NAME, html::NAME];
+const FILES: [&str; 7] = [SWEEP, SPEED, "tables.txt", "study.csv", study_file::NAME, found::NAME, html::NAME];
 
 /// Moves the study that a folder holds to `previous/N` below it, with the first free number N, so that no study
 /// is ever overwritten. Returns the new place; `None` if the folder holds no study.
@@ -55,7 +54,7 @@ pub fn keep_previous(folder: &Path) -> Result<Option<PathBuf>, Error> {
     Ok(Some(place))
 }
 
-/// All tables of a study: per scene, and the performance profiles.
+/// All tables of a study: per scene, the performance profiles, and what treatments of contacts change.
 pub fn tables(records: &[Record]) -> String {
     if sweep::is_sweep(records) {
         return sweep::tables(records);
@@ -65,11 +64,12 @@ pub fn tables(records: &[Record]) -> String {
         let (table, notes) = by_scene::scene_table(scene);
         text += &format!("{}{notes}\n", table.text());
     }
-    text + &answer::later_table(records) + &by_scene::profile_table(records).text()
+    text += &(answer::later_table(records) + &by_scene::profile_table(records).text());
+    text + &by_scene::treatment_tables(records).iter().map(|t| format!("\n{}", t.text())).collect::<String>()
 }
 
-/// Writes `tables.txt`, `study.csv`, `study.json` and a picture (`speed_vs_error.svg`, or `sweep.svg`) into `folder`, and the [page](html) made from these and the folder's other files. Returns
-/// their paths. If an earlier study was of the other kind, its picture is removed.
+/// Writes `tables.txt`, `study.csv`, `study.json` and a picture (`speed_vs_error.svg`, or `sweep.svg`) into `folder`, and
+/// the [page](html) made from these and the folder's other files. Returns their paths. If an earlier study was of the other kind, its picture is removed.
 ///
 /// Everything except the page is prepared before the first file is written.
 pub fn write_study(folder: &Path, study: &StudyFile) -> Result<Vec<PathBuf>, Error> {

@@ -7,6 +7,7 @@ use crate::lab::error::Error;
 use crate::lab::study::{Record, StudyPlan};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Name of the file in a study's folder.
@@ -38,6 +39,19 @@ pub struct ShardInfo {
     pub environment: Environment,
     /// Scenes of the part.
     pub scenes: Vec<String>,
+}
+
+/// The settings with different values in two studies: name, and both values as short text.
+pub fn differing_settings(one: &Value, other: &Value) -> Vec<(String, [String; 2])> {
+    let maps = [one, other].map(|settings| settings.as_object().cloned().unwrap_or_default());
+    let names: BTreeSet<&String> = maps.iter().flat_map(|map| map.keys()).collect();
+    let short = |value: Option<&Value>| {
+        let text = value.map_or("–".to_string(), Value::to_string);
+        if text.chars().count() > 80 { "…".to_string() } else { text }
+    };
+    let differs = |name: &&String| maps[0].get(*name) != maps[1].get(*name);
+    let of = |name: &String| (name.clone(), maps.each_ref().map(|map| short(map.get(name))));
+    names.into_iter().filter(differs).map(of).collect()
 }
 
 impl StudyFile {
@@ -136,6 +150,11 @@ impl StudyFile {
         };
         whole.records = in_turns(parts.into_iter().map(by_scene).collect());
         Ok(whole)
+    }
+
+    /// The number of steps to which runs were limited, if they were.
+    pub fn steps(&self) -> Option<u32> {
+        self.settings["steps"].as_u64().map(|steps| steps as u32)
     }
 
     /// The scenes that have records, in order.

@@ -1,5 +1,6 @@
 //! C7: boxes that start overlapping by a quarter.
 
+use super::holds::Demand;
 use super::parts::ground_line;
 use super::tolerance::Tolerances;
 use super::truth::rests_on_ground;
@@ -19,4 +20,5 @@ pub(super) const RECOVERY: Entry =
         Scene::new("overlap_recovery", bodies)
     })
     .known(|scene, _| rests_on_ground(scene))
+    .holds(&[Demand::Rests])
     .within(|scene, load| Tolerances::impacts(scene).percent(load));

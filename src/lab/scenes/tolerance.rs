@@ -27,9 +27,9 @@ impl Tolerance {
         Tolerance { value, reason, fixed: false }
     }
 
-    /// The limit at an accuracy.
-    pub fn at(&self, accuracy: Accuracy) -> f64 {
-        if self.fixed { self.value } else { self.value * accuracy.share() }
+    /// The limit at this multiple of the tolerances (1), see [`Accuracy::share`].
+    pub fn at(&self, share: f64) -> f64 {
+        if self.fixed { self.value } else { self.value * share }
     }
 }
 
@@ -208,10 +208,10 @@ mod tests {
     fn what_is_seen_grows_with_the_bodies_and_shrinks_with_the_accuracy() {
         assert_eq!((size(&scene(0.5)), size(&scene(2.0)), size(&Scene::new("x", vec![]))), (1.0, 4.0, 1.0));
         let own = Tolerances::standard(&scene(0.5)).penetration;
-        let at = Accuracy::ALL.map(|a| own.at(a));
+        let at = Accuracy::ALL.map(|a| own.at(a.share()));
         assert!(at.iter().zip([1e-2, 1e-3, 1e-4]).all(|(a, b)| (a - b).abs() < 1e-12), "{at:?}");
         let bounce = Tolerances::impacts(&scene(0.5)).fixed((2.0, "a"), (0.3, "b"));
-        assert_eq!(Accuracy::ALL.map(|a| bounce.residual.at(a)), [2.0; 3]);
+        assert_eq!(Accuracy::ALL.map(|a| bounce.residual.at(a.share())), [2.0; 3]);
         assert!((Tolerances::resting(&scene(0.5)).value - 5e-3).abs() < 1e-12);
     }
 

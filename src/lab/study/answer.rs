@@ -2,7 +2,6 @@
 
 use super::Record;
 use super::compare::compare;
-use crate::lab::scenes::tolerance::Accuracy;
 use std::cmp::Ordering;
 
 /// The recommendable settings of a scene. A setting is a solver, an order and a budget, at its fastest lane
@@ -21,15 +20,16 @@ pub struct Answer<'a> {
 impl<'a> Answer<'a> {
     /// From the records of one scene, for plausible runs. `None` if there are no records.
     pub fn of(records: &'a [Record]) -> Option<Answer<'a>> {
-        Self::at(records, Accuracy::Plausible)
+        Self::at(records, 1.0)
     }
 
-    /// From the records of one scene. `None` if there are no records.
-    pub fn at(records: &'a [Record], accuracy: Accuracy) -> Option<Answer<'a>> {
+    /// From the records of one scene, at this multiple of its tolerances. `None` if there are no records.
+    pub fn at(records: &'a [Record], share: f64) -> Option<Answer<'a>> {
         let scene = &records.first()?.scene;
+        let is_good = |r: &Record| r.excess_at(share) <= 1.0;
         let timed: Vec<&Record> = records.iter().filter(|r| r.sample.is_some()).collect();
         let mut good: Vec<&Record> = Vec::new();
-        let mut sorted: Vec<&Record> = timed.iter().copied().filter(|r| r.is_good(accuracy)).collect();
+        let mut sorted: Vec<&Record> = timed.iter().copied().filter(|r| is_good(r)).collect();
         sorted.sort_by(|a, b| a.cost_ns().total_cmp(&b.cost_ns()));
         for record in sorted {
             if !good.iter().any(|other| same(other, record)) {
@@ -43,8 +43,8 @@ impl<'a> Answer<'a> {
         if let Some(best) = best {
             good[..=best].rotate_right(1);
         }
-        let others = timed.into_iter().filter(|r| r.holds() && !r.is_good(accuracy));
-        let key = |r: &Record| (r.excess_at(accuracy), r.cost_ns());
+        let others = timed.into_iter().filter(|r| r.holds() && !is_good(r));
+        let key = |r: &Record| (r.excess_at(share), r.cost_ns());
         let nearest = others.min_by(|a, b| {
             let (a, b) = (key(a), key(b));
             a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
@@ -116,13 +116,15 @@ pub fn same(a: &Record, b: &Record) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lab::scenes::tolerance::Accuracy;
     use crate::lab::study::record::tests::{failed, fell, record};
 
     #[test]
     fn each_accuracy_has_its_own_cheapest() {
         // The tolerances are 10, 1 and 0.1 mm.
         let records = [record(8, 1, 5.0, 9e-3), record(8, 2, 10.0, 9e-4), record(8, 4, 20.0, 2e-4)];
-        let best = Accuracy::ALL.map(|a| Answer::at(&records, a).unwrap().best().map(|r| r.budget.substeps));
+        let best =
+            Accuracy::ALL.map(|a| Answer::at(&records, a.share()).unwrap().best().map(|r| r.budget.substeps));
         assert_eq!(best, [Some(1), Some(2), None]);
     }
 

@@ -1,6 +1,7 @@
 //! Budgets that a study tries, and checks for impossible budgets.
 
 use crate::engine::constraints::Impacts;
+use crate::engine::narrowphase::frozen::Freezing;
 use crate::engine::params::Budget;
 use crate::engine::solvers::{VARIANTS, Variant};
 use crate::lab::error::Error;
@@ -72,26 +73,27 @@ fn halved_and_doubled(variant: &Variant) -> [Budget; 3] {
     })
 }
 
+/// The kinds of sweeps that `variant` makes in a substep, and their numbers: `("velocity", 8)`.
+pub fn kinds(budget: &Budget, variant: &Variant) -> impl Iterator<Item = (&'static str, u32)> {
+    let all = [
+        ("velocity", budget.velocity_iterations, variant.uses.velocity),
+        ("relax", budget.relax_iterations, variant.uses.relax),
+        ("position", budget.position_iterations, variant.uses.position),
+    ];
+    all.into_iter().filter(|kind| kind.2).map(|(name, count, _)| (name, count))
+}
+
 /// Sweeps in one step.
 pub fn sweeps(budget: &Budget, variant: &Variant) -> u32 {
-    let each = [
-        (variant.uses.velocity, budget.velocity_iterations),
-        (variant.uses.relax, budget.relax_iterations),
-        (variant.uses.position, budget.position_iterations),
-    ];
-    let per_substep = each.iter().filter(|e| e.0).fold(0_u32, |sum, e| sum.saturating_add(e.1));
+    let per_substep = kinds(budget, variant).fold(0_u32, |sum, (_, count)| sum.saturating_add(count));
     budget.substeps.saturating_mul(per_substep)
 }
 
 /// Rejects a kind of sweep that none of `solvers` makes, and names the solvers that do. `option` is
 /// `velocity-iterations` or similar.
 pub fn check_used(option: &str, solvers: &[&'static Variant]) -> Result<(), Error> {
-    let uses = |v: &Variant| match option {
-        "velocity-iterations" => v.uses.velocity,
-        "relax-iterations" => v.uses.relax,
-        "position-iterations" => v.uses.position,
-        _ => true,
-    };
+    let Some(kind) = option.strip_suffix("-iterations") else { return Ok(()) };
+    let uses = |v: &Variant| kinds(&v.budget, v).any(|(name, _)| name == kind);
     if solvers.iter().any(|v| uses(v)) {
         return Ok(());
     }
@@ -127,25 +129,23 @@ pub fn check(budget: &Budget, variant: &Variant) -> Result<(), Error> {
 /// Short text of a budget, with the fields that `variant` uses: `4 sub · 1 vel · 1 rel`.
 pub fn brief(budget: &Budget, variant: &Variant) -> String {
     let mut text = format!("{} sub", budget.substeps);
-    let fields = [
-        ("vel", budget.velocity_iterations, variant.uses.velocity),
-        ("rel", budget.relax_iterations, variant.uses.relax),
-        ("pos", budget.position_iterations, variant.uses.position),
-    ];
-    for (name, value, used) in fields {
-        if used {
-            text += &format!(" {value} {name}");
-        }
+    for (name, count) in kinds(budget, variant) {
+        text += &format!(" {count} {}", &name[..3]);
     }
     text
 }
 
-/// Appends the treatment of impacts, unless it is the solver's own.
-pub fn with_impacts(text: String, impacts: Impacts) -> String {
-    match impacts {
+/// Appends the treatment of impacts and of frozen contacts, unless they are the solver's own.
+pub fn with_treatments(text: String, impacts: Impacts, frozen: Freezing) -> String {
+    let text = match impacts {
         Impacts::Own => text,
         Impacts::Waves => text + " waves",
         Impacts::None => text + " no impacts",
+    };
+    match frozen {
+        Freezing::Own => text,
+        Freezing::Off => text + " fresh",
+        Freezing::Within(_) => format!("{text} frozen {frozen}"),
     }
 }
 

@@ -1,8 +1,6 @@
-//! Time against error of a solver's settings: the curves of a work-precision diagram.
+//! Errors to compare with time.
 
 use super::Record;
-use crate::engine::params::Budget;
-use crate::engine::world::Order;
 use crate::lab::scenes::tolerance::{Tolerance, Tolerances};
 
 /// Smaller errors are raised to this value, because logarithms need positive numbers.
@@ -77,42 +75,6 @@ impl ErrorAxis {
     }
 }
 
-/// A setting: a solver, an order and a budget, at its fastest lane width.
-#[derive(Clone, Copy, Debug)]
-pub struct SettingSample<'a> {
-    /// Its record.
-    pub record: &'a Record,
-    /// Index of the budget among the solver's budgets, in the order in which they were tried.
-    pub budget: usize,
-    /// Time of a step (ns).
-    pub time: f64,
-    /// The error, at least [`ERROR_FLOOR`].
-    pub error: f64,
-}
-
-/// The settings of a solver on one scene.
-///
-/// The settings are separate runs, so curves are not interpolated.
-#[derive(Clone, Debug)]
-pub struct Curve<'a> {
-    /// Name of the solver.
-    pub solver: &'static str,
-    /// The settings. Those that do not hold or have no such error are left out.
-    pub samples: Vec<SettingSample<'a>>,
-}
-
-/// Budgets of a solver with their parameters, in the order in which they were tried.
-pub fn budgets_of<'a>(records: &'a [Record], solver: &str) -> Vec<(Budget, &'a str)> {
-    let mut budgets = Vec::new();
-    for record in records.iter().filter(|r| r.solver == solver) {
-        let own = (record.budget, record.parameters.as_str());
-        if !budgets.contains(&own) {
-            budgets.push(own);
-        }
-    }
-    budgets
-}
-
 /// Solvers, in the order in which they were tried.
 pub fn solvers_of(records: &[Record]) -> Vec<&'static str> {
     let mut solvers = Vec::new();
@@ -124,80 +86,14 @@ pub fn solvers_of(records: &[Record]) -> Vec<&'static str> {
     solvers
 }
 
-/// The curves of one scene, one per solver: every order and budget that holds, at its fastest width.
-pub fn curves(records: &[Record], axis: ErrorAxis) -> Vec<Curve<'_>> {
-    let curve = |solver: &'static str| {
-        let own = || records.iter().filter(|r| r.solver == solver);
-        let mut samples: Vec<SettingSample> = Vec::new();
-        for (budget, value) in budgets_of(records, solver).iter().enumerate() {
-            for order in Order::ALL {
-                let same = |r: &&Record| (r.budget, r.parameters.as_str()) == *value && r.order == order;
-                let widths = own().filter(same);
-                let timed = widths.filter(|r| r.holds()).filter_map(|record| {
-                    let (sample, error) = (record.sample.as_ref()?, axis.of(record)?);
-                    Some(SettingSample {
-                        record,
-                        budget,
-                        time: sample.cost_ns(),
-                        error: error.max(ERROR_FLOOR),
-                    })
-                });
-                samples.extend(timed.min_by(|a, b| a.time.total_cmp(&b.time)));
-            }
-        }
-        Curve { solver, samples }
-    };
-    solvers_of(records).into_iter().map(curve).collect()
-}
-
-impl<'a> Curve<'a> {
-    /// The Pareto-optimal settings of the solver in time and error, the fastest first.
-    pub fn front(&self) -> Vec<SettingSample<'a>> {
-        let mut sorted = self.samples.clone();
-        sorted.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.error.total_cmp(&b.error)));
-        let mut least = f64::INFINITY;
-        sorted.retain(|s| {
-            let is_better = s.error < least;
-            least = least.min(s.error);
-            is_better
-        });
-        sorted
-    }
-}
-
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
-    use crate::lab::study::record::tests::{failed, fell, record};
-
-    /// Records of `pgs` with times (µs) and errors (m).
-    fn settings(samples: &[(f64, f64)]) -> Vec<Record> {
-        samples.iter().zip(1..).map(|(&(time, error), substeps)| record(8, substeps, time, error)).collect()
-    }
-
-    fn at(sample: Option<SettingSample>) -> Option<(f64, f64)> {
-        sample.map(|s| (s.time / 1e3, s.error))
-    }
+    use crate::lab::study::record::tests::record;
 
     #[test]
-    fn a_larger_budget_need_not_be_slower_or_better() {
-        let records = settings(&[(10.0, 0.1), (30.0, 0.4), (8.0, 0.01), (8.0, 0.02), (20.0, 0.01)]);
-        let found = curves(&records, ErrorAxis::Penetration);
-        let c = &found[0];
-        let front: Vec<_> = c.front().into_iter().map(|s| at(Some(s)).unwrap()).collect();
-        assert_eq!(front, [(8.0, 0.01)]);
-    }
-
-    #[test]
-    fn a_curve_has_the_fastest_width_of_each_budget_in_each_order() {
-        let natural = Record { order: Order::Natural, ..record(1, 1, 5.0, 0.7) };
-        let records =
-            [natural, record(1, 1, 20.0, 0.5), record(8, 1, 10.0, 0.5), record(8, 2, 30.0, 0.0), failed(8)];
-        let records: Vec<Record> = records.into_iter().chain([fell(8, 4, 1.0, 0.0)]).collect();
-        let found = curves(&records, ErrorAxis::Penetration);
-        let samples: Vec<_> = found[0].samples.iter().map(|s| (s.budget, s.time, s.error)).collect();
-        assert_eq!(samples, [(0, 5e3, 0.7), (0, 10e3, 0.5), (1, 30e3, ERROR_FLOOR)]);
-        assert!(curves(&records, ErrorAxis::Truth)[0].samples.is_empty());
+    fn an_error_is_in_its_own_unit() {
+        let records = [record(8, 1, 20.0, 0.5)];
         let (law, unit) = (ErrorAxis::Law.of(&records[0]), ErrorAxis::Penetration.unit(&records));
         assert_eq!((law, unit), (Some(0.0), "m"));
     }

@@ -4,32 +4,33 @@
 //! would name are therefore extended, untimed and on all cores. Each setting that fails is replaced by the
 //! next one.
 
+use super::Record;
 use super::answer::{Answer, same};
 use super::record::Later;
-use super::{Record, StudyPlan};
-use crate::engine::lanes::LaneWidth;
-use crate::engine::solvers::find;
+use super::search::LEVELS;
 use crate::engine::world::Settings;
 use crate::lab::error::Error;
 use crate::lab::metrics::rest::REST_WINDOW;
-use crate::lab::overrides;
-use crate::lab::scenes::Loaded;
-use crate::lab::scenes::holds::{Broken, HORIZON, Mark};
-use crate::lab::scenes::tolerance::Accuracy;
+use crate::lab::scenes::Scene;
+use crate::lab::scenes::holds::{Broken, Demand, HORIZON, Mark};
 use crate::lab::trial::Trial;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Runs a scene that should come to rest for [`HORIZON`], or for its own steps if that is longer.
+/// Runs a scene that should come to rest for [`HORIZON`], or for its own steps if that is longer, under its demands.
 ///
 /// Errors: a scene that cannot be built.
-pub fn later(loaded: &Loaded, settings: Settings) -> Result<Later, Error> {
-    let scene = &loaded.scene;
+pub fn later(scene: &Scene, demands: &[Demand], settings: Settings) -> Result<Later, Error> {
     let steps = ((HORIZON / scene.dt).ceil() as u64).max(u64::from(scene.steps));
     let measured = (REST_WINDOW / scene.dt).round().max(1.0) as u64;
     let settings = Settings { record_impulses: false, timed: false, ..settings };
-    let demands = loaded.demands.clone();
-    let trial = Trial { demands, steps, measured, until_broken: true, ..Trial::new(scene, settings) };
+    let trial = Trial {
+        demands: demands.to_vec(),
+        steps,
+        measured,
+        until_broken: true,
+        ..Trial::new(scene, settings)
+    };
     let found = trial.run(&mut |_| Ok(()))?;
     let diverged = found.failure.map(|d| Broken { mark: Mark::BlewUp, step: d.step, body: Some(d.body) });
     let broken = diverged.or(found.broken);
@@ -70,18 +71,17 @@ pub fn in_parallel<T: Sync, R: Send>(
 ///
 /// Errors: as [`later`].
 pub fn run_on(
-    plan: &StudyPlan,
-    name: &str,
+    scene: &Scene,
+    demands: &[Demand],
     records: &mut [Record],
     tell: &dyn Fn(String),
 ) -> Result<(), Error> {
     loop {
         let mut untried: Vec<&Record> = Vec::new();
-        for accuracy in Accuracy::ALL {
-            let Some(answer) = Answer::at(records, accuracy) else { return Ok(()) };
-            // Statements about each solver refer to plausible runs, so there the best setting of each solver
-            // is extended.
-            let each = if accuracy == Accuracy::Plausible { answer.of_each_solver() } else { Vec::new() };
+        for level in LEVELS {
+            let Some(answer) = Answer::at(records, level) else { return Ok(()) };
+            // A ranking has the best setting of each solver at these levels.
+            let each = if level >= 0.5 { answer.of_each_solver() } else { Vec::new() };
             for record in answer.untried().chain(each.into_iter().filter(|r| r.later.is_none())) {
                 if untried.iter().all(|other| !same(other, record)) {
                     untried.push(record);
@@ -91,32 +91,19 @@ pub fn run_on(
         if untried.is_empty() {
             return Ok(());
         }
-        tell(format!("extending {name} to a minute: {} settings", untried.len()));
-        let jobs: Vec<(Record, Settings)> =
-            untried.into_iter().map(|r| Ok((r.clone(), settings(r)?))).collect::<Result<_, Error>>()?;
-        let found = in_parallel(&jobs, |(_, settings)| later(&plan.open(name)?, settings.clone()))?;
-        for ((record, _), later) in jobs.iter().zip(found) {
+        tell(format!("extending {} to a minute: {} settings", scene.name, untried.len()));
+        let untried: Vec<Record> = untried.into_iter().cloned().collect();
+        let found = in_parallel(&untried, |record| later(scene, demands, record.settings()?))?;
+        for (record, later) in untried.iter().zip(found) {
             records.iter_mut().filter(|r| same(r, record)).for_each(|r| r.later = Some(later));
         }
     }
 }
 
-/// The settings of a record's run.
-fn settings(record: &Record) -> Result<Settings, Error> {
-    let solver = find(record.solver)?;
-    let width = LaneWidth::from_lanes(record.lanes).unwrap_or(LaneWidth::W1);
-    Ok(Settings {
-        order: record.order,
-        budget: record.budget,
-        impacts: record.impacts,
-        parameters: overrides::of_words(solver, &record.parameters)?,
-        ..Settings::new(solver).exactly(width)
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::solvers::find;
     use crate::lab::scenes;
 
     #[test]
@@ -125,7 +112,8 @@ mod tests {
             let solver = find(solver).unwrap();
             let mut settings = Settings::new(solver);
             settings.budget.velocity_iterations = velocity_iterations;
-            later(&scenes::load("stack:20").unwrap(), settings).unwrap()
+            let loaded = scenes::load("stack:20").unwrap();
+            later(&loaded.scene, &loaded.demands, settings).unwrap()
         };
         // Eight sweeps do not support twenty boxes.
         let fallen = run("pgs", 8);

@@ -12,6 +12,7 @@
 #[doc(hidden)]
 pub mod answer;
 pub mod budget;
+pub mod class;
 pub mod compare;
 #[doc(hidden)]
 pub mod curve;
@@ -38,14 +39,16 @@ pub mod telling;
 
 use crate::engine::constraints::{Features, Impacts};
 use crate::engine::lanes::LaneWidth;
+use crate::engine::narrowphase::frozen::Freezing;
 use crate::engine::solvers::{VARIANTS, Variant, find};
-use crate::engine::world::{Criterion, Divergence, Order, Quantity, Settings};
+use crate::engine::world::{Divergence, Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::metrics::Errors;
 use crate::lab::overrides;
 use crate::lab::scenes::holds::Broken;
 use crate::lab::scenes::{Loaded, Scene};
 use crate::lab::trial::{Trial, TrialOutcome};
+use class::SceneClass;
 use compare::Ratio;
 use found::{Found, FoundBudgets, TunedBudget};
 use horizon::in_parallel;
@@ -57,18 +60,22 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use sweep::Swept;
 
-/// Scenes of the default study. Each one shows an effect that the others do not.
-pub const DEFAULT_SCENES: [&str; 11] = [
-    "incline_slip",
-    "bounce",
+/// Scenes of the default study. Each one shows an effect that the others do not. As many arrive at rest as are
+/// placed there, see [`class::SceneClass`].
+pub const DEFAULT_SCENES: [&str; 14] = [
     "disc_column:10",
-    "mass_ratio:100",
     "stack:20",
-    "far_stack",
-    "friction_ramp",
     "arch",
     "card_house",
     "pyramid:30",
+    "vertical_stack",
+    "circle_stack",
+    "high_mass_ratio_1",
+    "high_mass_ratio_2",
+    "overlap_recovery",
+    "incline_slip",
+    "bounce",
+    "friction_ramp",
     "circle_pile:500",
 ];
 
@@ -114,6 +121,7 @@ struct ErrorCell {
     swept: Option<Swept>,
     solver: &'static Variant,
     impacts: Impacts,
+    frozen: Freezing,
     tuned: TunedBudget,
     /// Whether the cell runs at its widest lanes only, see [`StudyPlan::widest_alone`].
     widest_alone: bool,
@@ -123,7 +131,7 @@ impl ErrorCell {
     /// Its budget, and the parameters that differ from the solver's defaults.
     fn text(&self) -> String {
         let budget = budget::brief(&self.tuned.budget, self.solver);
-        let budget = budget::with_impacts(budget, self.impacts);
+        let budget = budget::with_treatments(budget, self.impacts, self.frozen);
         let parameters = overrides::brief(self.solver, &self.tuned.parameters);
         if parameters.is_empty() { budget } else { format!("{budget} {parameters}") }
     }
@@ -190,7 +198,9 @@ fn scene_records(
             for &impacts in plan.impacts_on(scene) {
                 for tuned in plan.candidates(&scene.name, solver, impacts, swept)? {
                     let widest_alone = plan.widest_alone(scene, &tuned.budget, solver);
-                    cells.push(ErrorCell { point, swept, solver, impacts, tuned, widest_alone });
+                    let cell =
+                        |frozen| ErrorCell { point, swept, solver, impacts, frozen, tuned, widest_alone };
+                    cells.extend(plan.frozen_of(solver).into_iter().map(cell));
                 }
             }
         }
@@ -216,18 +226,22 @@ fn scene_records(
         timed_records(plan, &variants, steps, &rows, &|share, what| tell(0.5 + 0.4 * share, what))?;
     // What was asked for is judged in any case.
     if plan.steps.is_some() && !plan.only_given {
-        leave_out_unseen(&mut records, &variants[0].scene);
+        leave_out_unseen(&mut records, variants[0].scene.steps);
     }
+    let class = SceneClass::of(&variants[0])?;
+    records.iter_mut().for_each(|r| r.class = class);
     if plan.sweep.is_none() && variants[0].rests() {
-        horizon::run_on(plan, name, &mut records, &|what| tell(0.95, what))?;
+        let Loaded { scene, demands, .. } = &variants[0];
+        horizon::run_on(scene, demands, &mut records, &|what| tell(0.95, what))?;
     }
     mark_fronts(&mut records);
     Ok(records)
 }
 
-/// Removes tolerances for errors that a shortened run could not observe.
-fn leave_out_unseen(records: &mut [Record], scene: &Scene) {
-    if f64::from(scene.steps) * scene.dt < 2.0 * crate::lab::metrics::rest::REST_WINDOW {
+/// Removes tolerances for errors that a run shortened to `steps` could not observe.
+fn leave_out_unseen(records: &mut [Record], steps: u32) {
+    if records.first().is_some_and(|r| f64::from(steps) * r.dt < 2.0 * crate::lab::metrics::rest::REST_WINDOW)
+    {
         // Rest is measured over the last second, which must be preceded by at least as long a run.
         records.iter_mut().for_each(|r| r.tolerances.rest = None);
     }
@@ -240,23 +254,16 @@ fn leave_out_unseen(records: &mut [Record], scene: &Scene) {
 
 /// Settings of a cell for one order and one width.
 fn settings(plan: &StudyPlan, cell: &ErrorCell, order: Order, width: LaneWidth) -> Settings {
-    let mut parameters = cell.tuned.parameters;
+    let TunedBudget { budget, mut parameters } = cell.tuned;
+    let mut extra_features = Features::NONE;
     if let Some((sweep, point)) = plan.sweep.as_ref().zip(cell.swept) {
         // Errors were ruled out when the plan was checked.
         let _ = sweep.set(point.value, &mut parameters, cell.solver);
+        extra_features = sweep.features(point.value);
     }
-    Settings {
-        order,
-        budget: cell.tuned.budget,
-        impacts: cell.impacts,
-        parameters,
-        extra_features: plan
-            .sweep
-            .as_ref()
-            .zip(cell.swept)
-            .map_or(Features::NONE, |(s, at)| s.features(at.value)),
-        ..Settings::new(cell.solver).exactly(width)
-    }
+    let ErrorCell { impacts, frozen, .. } = *cell;
+    let own = Settings::new(cell.solver).exactly(width);
+    Settings { order, budget, impacts, frozen, parameters, extra_features, ..own }
 }
 
 /// Number of steps of a timing run for scenes that take turns.
@@ -279,11 +286,11 @@ pub fn observe(mut loaded: Loaded, settings: Settings, hash_at: u32) -> Result<R
 
 /// The same up to the first violated requirement. Also returns the work of an average step: its sweeps and
 /// substeps.
-fn observe_until_broken(mut loaded: Loaded, settings: Settings) -> Result<(RunOutcome, f64), Error> {
+fn observe_until_broken(loaded: &mut Loaded, settings: Settings) -> Result<(RunOutcome, f64), Error> {
     let settings = Settings { record_impulses: true, observe_rule: true, ..settings };
     let substeps = f64::from(settings.budget.substeps);
     let (mut steps, mut sweeps) = (0_u64, 0);
-    let trial = Trial { until_broken: true, ..Trial::of(&mut loaded, settings) };
+    let trial = Trial { until_broken: true, ..Trial::of(loaded, settings) };
     let found = trial.run(&mut |world| {
         if world.step_index > 0 {
             (steps, sweeps) = (steps + 1, sweeps + world.counts.sweeps);
@@ -336,37 +343,29 @@ fn timed_records(
     rows: &[RecordRow],
     tell: &dyn Fn(f64, String),
 ) -> Result<Vec<Record>, Error> {
-    let running: Vec<usize> = (0..rows.len()).filter(|&i| rows[i].outcome.errors.is_ok()).collect();
     let variant = |row: &RecordRow| &variants[row.cell.point];
-    let chosen = running.iter().map(|&i| {
-        let row = &rows[i];
-        (&variant(row).scene, settings(plan, row.cell, row.order, row.width))
-    });
+    let running = rows.iter().filter(|row| row.outcome.errors.is_ok());
+    let chosen = running.map(|row| (&variant(row).scene, settings(plan, row.cell, row.order, row.width)));
     let mut interleaved = Interleaved::new(chosen.collect(), steps, plan.seed);
     let name = &variants[0].scene.name;
     for pass in 1..=plan.repeats {
         tell(f64::from(pass - 1) / f64::from(plan.repeats), format!("times {name} · pass {pass}"));
         interleaved.run(1)?;
     }
-    let place = |i: usize| running.binary_search(&i).ok();
-    let untimed =
-        Divergence { step: 0, body: 0, quantity: Quantity::Speed, speed: 0.0, criterion: Criterion::Bounds };
-    let sample = |interleaved: &Interleaved, i: usize| match rows[i].outcome.errors {
-        Ok(_) => place(i).map_or(Err(untimed), |place| interleaved.sample(place)),
-        Err(divergence) => Err(divergence),
-    };
-    let record = |(i, row): (usize, &RecordRow)| {
-        let sample = sample(&interleaved, i);
+    // Samples are in the order of the rows that run.
+    let mut next = 0..;
+    let record = |row: &RecordRow| {
+        let sample = row.outcome.errors.and_then(|_| interleaved.sample(next.next().unwrap_or(0)));
         let failure = sample.as_ref().err().map(|&d| FailedAt::from(d));
         record_of(plan, variant(row), row, sample.ok(), failure)
     };
-    let mut records: Vec<Record> = rows.iter().enumerate().map(record).collect();
+    let mut records: Vec<Record> = rows.iter().map(record).collect();
 
     let one_lane = |r: &Record| r.order == Order::Colored && r.lanes == 1;
     for i in 0..records.len() {
         let own = &records[i];
         let budget = |r: &&Record| {
-            let key = |r: &Record| (r.solver, r.budget, r.impacts, r.swept, r.parameters.clone());
+            let key = |r: &Record| (r.solver, r.budget, r.impacts, r.frozen, r.swept, r.parameters.clone());
             key(r) == key(own)
         };
         let slow = records.iter().filter(budget).find(|r| one_lane(r)).and_then(|r| r.sample.as_ref());
@@ -390,6 +389,7 @@ fn record_of(
     Record {
         scene: scene.name.clone(),
         bodies: scene.bodies.len(),
+        class: SceneClass::default(),
         dt: scene.dt,
         solver: cell.solver.name,
         order: *order,
@@ -397,6 +397,7 @@ fn record_of(
         budget: cell.tuned.budget,
         budget_text: cell.text(),
         impacts: cell.impacts,
+        frozen: cell.frozen,
         parameters: overrides::words(cell.solver, &parameters),
         swept: cell.swept,
         speed_up: None,

@@ -6,6 +6,7 @@ use super::sweep::{QuantitySweep, Swept};
 use super::{DEFAULT_SCENES, default_solvers, horizon};
 use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
+use crate::engine::narrowphase::frozen::Freezing;
 use crate::engine::params::Budget;
 use crate::engine::solvers::{DEFAULT, Variant, find};
 use crate::engine::world::{Order, Settings};
@@ -32,6 +33,8 @@ pub struct StudyPlan {
     pub orders: Vec<Order>,
     /// Treatments of impacts. Scenes without restitution run only the first.
     pub impacts: Vec<Impacts>,
+    /// Treatments of frozen contacts. Of those that are the same for a solver, the first runs.
+    pub frozen: Vec<Freezing>,
     /// Work per step. An empty grid stands for the [found](Self::found) settings.
     pub budgets: BudgetGrid,
     /// Settings to try if no budgets are given.
@@ -73,6 +76,7 @@ impl Default for StudyPlan {
             widths: widths(native_width()),
             orders: vec![Order::Natural, Order::Colored],
             impacts: vec![Impacts::Own, Impacts::Waves],
+            frozen: vec![Freezing::Own],
             budgets: BudgetGrid::default(),
             found: Found::shipped(),
             thorough: false,
@@ -108,6 +112,7 @@ impl StudyPlan {
             ("lanes", self.widths.is_empty()),
             ("orders", self.orders.is_empty()),
             ("impacts", self.impacts.is_empty()),
+            ("frozen", self.frozen.is_empty()),
         ];
         if let Some((name, _)) = empty.into_iter().find(|e| e.1) {
             return Err(Error::invalid(name, "none given"));
@@ -135,7 +140,10 @@ impl StudyPlan {
                 scene = Some(own);
             }
             let Some(scene) = scene else { continue };
-            let worlds = settings * self.impacts_on(&scene).len() * (self.widths.len() + self.orders.len());
+            let worlds = settings
+                * self.impacts_on(&scene).len()
+                * self.frozen.len()
+                * (self.widths.len() + self.orders.len());
             let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
             memory::check(name, scene.bodies.len(), worlds, threads)?;
             if self.solvers.iter().all(|solver| scene.runs_on(solver).is_err()) {
@@ -168,6 +176,18 @@ impl StudyPlan {
     pub(super) fn impacts_on(&self, scene: &Scene) -> &[Impacts] {
         let bounces = scene.bodies.iter().flat_map(|b| &b.shapes).any(|s| s.restitution > 0.0);
         if bounces { &self.impacts } else { &self.impacts[..self.impacts.len().min(1)] }
+    }
+
+    /// The treatments of frozen contacts to run under a solver: each with other limits.
+    pub(super) fn frozen_of(&self, solver: &Variant) -> Vec<Freezing> {
+        let mut kept: Vec<Freezing> = Vec::new();
+        for &frozen in &self.frozen {
+            let limits = |f: Freezing| f.limits(solver.frozen);
+            if kept.iter().all(|&other| limits(other) != limits(frozen)) {
+                kept.push(frozen);
+            }
+        }
+        kept
     }
 
     /// Opens a scene, with the tolerances of the plan.
@@ -205,12 +225,14 @@ impl StudyPlan {
     pub fn find_out(&mut self) -> Result<Vec<String>, Error> {
         let mut said = Vec::new();
         for name in self.scenes.clone() {
-            let loaded = open_scene(&name, Some(self.seed), None, None)?;
-            if !is_path(&name) || loaded.scene.expect.is_some() {
+            if !is_path(&name) {
                 continue;
             }
-            let settings = Settings::new(find(DEFAULT)?);
-            let later = horizon::later(&loaded, settings)?;
+            let loaded = open_scene(&name, Some(self.seed), None, None)?;
+            if loaded.scene.expect.is_some() {
+                continue;
+            }
+            let later = horizon::later(&loaded.scene, &loaded.demands, Settings::new(find(DEFAULT)?))?;
             let limit = self.tolerances.rest.unwrap_or(Tolerances::resting(&loaded.scene).value);
             let found = match (later.broken, later.rest_speed_m_s) {
                 (None, Some(speed)) if speed <= limit => {

@@ -7,45 +7,46 @@
 //! fastest, not in the score.
 //!
 //! The choice of scenes and tolerances is arbitrary. Every score therefore has a range: over all studies with
-//! one scene left out, and with half or twice the tolerances. Only a solver that is first in all of them
-//! [leads](Ranking::leader), by more than a negligible difference of time.
+//! one scene or one [class](SceneClass) of scenes left out, and with half or twice the tolerances, at which
+//! settings were [searched](super::search) as well. Only a solver that is first in all of them
+//! [leads](Ranking::leader), by more than a negligible difference of time. The same holds within a class.
 
 use super::Record;
+use super::class::SceneClass;
 use super::compare::TIE;
 use super::curve::solvers_of;
 use super::profile::times_of_fastest;
 use crate::lab::scenes::tolerance::Accuracy;
 
 /// Result of a solver over all scenes.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Standing {
     /// Name of the solver.
     pub solver: &'static str,
     /// Mean speed relative to the fastest solver, in [0, 1].
     pub score: f64,
-    /// Smallest and largest score with one scene left out, or with other tolerances.
+    /// Smallest and largest score with one scene or class left out, or with other tolerances.
     pub range: [f64; 2],
-    /// Number of scenes on which some setting holds.
-    pub holds: usize,
+    /// Mean speed on the scenes of each class; `None` without any.
+    pub by_class: [Option<f64>; 3],
     /// Number of scenes on which some setting holds and meets all tolerances, at each accuracy.
     pub good: [usize; 3],
     /// Number of scenes, for plausible runs, on which it is the fastest solver or ties with it.
     pub fastest: usize,
-    /// Number of scenes, for plausible runs, on which it takes at most [`CLOSE`] times as long as the
-    /// fastest.
-    pub close: usize,
     /// Scenes on which none of its settings is good enough for a plausible run.
     pub fails_on: Vec<String>,
 }
 
 /// All solvers by score, and those that are first in some variation.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Ranking {
     /// Sorted by score, the best first; equal ones by name.
     pub standings: Vec<Standing>,
-    /// Solvers that are first in some variation: with any scene left out, or with half or twice the
+    /// Solvers that are first in some variation: with any scene or class left out, or with half or twice the
     /// tolerances. Sorted by score.
     pub first: Vec<&'static str>,
+    /// The same on the scenes of each class alone. Empty without scenes of the class.
+    pub first_in: [Vec<&'static str>; 3],
 }
 
 impl Ranking {
@@ -56,71 +57,79 @@ impl Ranking {
     }
 }
 
-/// Times up to this multiple of the fastest count as close (1).
-pub const CLOSE: f64 = 1.5;
-
 /// Variations of the tolerances, as multiples of the scenes' own (1).
 const FACTORS: [f64; 2] = [0.5, 2.0];
 
-/// Speed of each solver on a scene, relative to the fastest, and whether it ties with that one. Speed 0 if
+/// The speeds of all solvers on a scene, relative to the fastest, and whether they tie with that one. Speed 0 if
 /// none of a solver's settings is good enough.
-fn speeds(scene: &[Record], solvers: &[&'static str], tolerance: f64) -> Vec<(f64, bool)> {
-    let times = times_of_fastest(scene, solvers, |r| r.excess() <= tolerance);
+type Speeds = Vec<(f64, bool)>;
+
+fn speeds(scene: &[Record], solvers: &[&'static str], share: f64) -> Speeds {
+    let times = times_of_fastest(scene, solvers, |r| r.excess_at(share) <= 1.0);
     times.into_iter().map(|time| time.map_or((0.0, false), |(t, ties)| (1.0 / t, ties))).collect()
 }
 
-/// Mean speed of each solver over the scenes, without one of them if given.
-fn scores(speeds: &[Vec<(f64, bool)>], without: Option<usize>) -> Vec<f64> {
-    let kept: Vec<&Vec<(f64, bool)>> =
-        speeds.iter().enumerate().filter(|(i, _)| Some(*i) != without).map(|(_, s)| s).collect();
+/// Scenes with their speeds at their own tolerances, and at each of [`FACTORS`].
+type SceneSpeeds<'a> = (&'a [Record], [Speeds; 3]);
+
+/// Mean speed of each solver over those of the scenes that are kept, at the tolerances with this index.
+fn scores(scenes: &[&SceneSpeeds], at: usize, keep: impl Fn(&[Record]) -> bool) -> Vec<f64> {
+    let kept: Vec<&Speeds> = scenes.iter().filter(|s| keep(s.0)).map(|s| &s.1[at]).collect();
     let count = kept.first().map_or(0, |s| s.len());
     (0..count).map(|k| kept.iter().map(|s| s[k].0).sum::<f64>() / kept.len() as f64).collect()
+}
+
+/// The scores over these scenes in every variation; those over all of them at their own tolerances are the first.
+fn variations(scenes: &[&SceneSpeeds]) -> Vec<Vec<f64>> {
+    let mut tried: Vec<Vec<f64>> = (0..=FACTORS.len()).map(|at| scores(scenes, at, |_| true)).collect();
+    tried.extend(scenes.iter().map(|out| scores(scenes, 0, |own| own[0].scene != out.0[0].scene)));
+    tried.extend(SceneClass::ALL.map(|out| scores(scenes, 0, |own| own[0].class != out)));
+    tried.retain(|scores| !scores.is_empty());
+    tried
 }
 
 /// Ranks the solvers over the scenes of `records`.
 pub fn ranking(records: &[Record]) -> Ranking {
     let solvers = solvers_of(records);
-    let scenes: Vec<&[Record]> = records.chunk_by(|a, b| a.scene == b.scene).collect();
-    let by_factor = |factor: f64| -> Vec<Vec<(f64, bool)>> {
-        scenes.iter().map(|s| speeds(s, &solvers, factor)).collect()
-    };
-    let own = by_factor(1.0);
-    let mut tried: Vec<Vec<f64>> = FACTORS.into_iter().map(|f| scores(&by_factor(f), None)).collect();
-    if scenes.len() > 1 {
-        tried.extend((0..scenes.len()).map(|i| scores(&own, Some(i))));
-    }
-    let whole = scores(&own, None);
-    tried.push(whole.clone());
+    let by_factor =
+        |scene: &[Record]| [1.0, FACTORS[0], FACTORS[1]].map(|share| speeds(scene, &solvers, share));
+    let scenes: Vec<SceneSpeeds> =
+        records.chunk_by(|a, b| a.scene == b.scene).map(|scene| (scene, by_factor(scene))).collect();
+    let all: Vec<&SceneSpeeds> = scenes.iter().collect();
+    let tried = variations(&all);
+    let of_class = |class| scenes.iter().filter(move |s| s.0[0].class == class).collect::<Vec<_>>();
+    let tried_in = SceneClass::ALL.map(|class| variations(&of_class(class)));
     let standing = |(k, &solver): (usize, &&'static str)| {
-        let times = own.iter().map(|s| s[k]);
         let good = |accuracy: Accuracy| {
-            let is_good = |s: &&&[Record]| s.iter().any(|r| r.solver == solver && r.is_good(accuracy));
+            let is_good = |s: &&SceneSpeeds| s.0.iter().any(|r| r.solver == solver && r.is_good(accuracy));
             scenes.iter().filter(is_good).count()
         };
         let least = tried.iter().map(|t| t[k]).fold(f64::INFINITY, f64::min);
         let most = tried.iter().map(|t| t[k]).fold(0.0, f64::max);
-        let failing = scenes.iter().zip(&own).filter(|(_, speeds)| speeds[k].0 == 0.0);
+        let failing = scenes.iter().filter(|s| s.1[0][k].0 == 0.0);
         Standing {
             solver,
-            score: whole[k],
+            score: tried[0][k],
             range: [least, most],
-            holds: scenes.iter().filter(|s| s.iter().any(|r| r.solver == solver && r.holds())).count(),
+            by_class: tried_in.each_ref().map(|tried| Some(tried.first()?[k])),
             good: Accuracy::ALL.map(good),
-            fastest: times.clone().filter(|&(_, ties)| ties).count(),
-            close: times.filter(|&(speed, _)| speed * CLOSE >= 1.0).count(),
-            fails_on: failing.map(|(scene, _)| scene[0].scene.clone()).collect(),
+            fastest: scenes.iter().filter(|s| s.1[0][k].1).count(),
+            fails_on: failing.map(|s| s.0[0].scene.clone()).collect(),
         }
     };
     let mut standings: Vec<Standing> = solvers.iter().enumerate().map(standing).collect();
     standings.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.solver.cmp(b.solver)));
-    // Solvers that share first place all count; so do those behind by a difference that is no verdict.
-    let is_first = |k: usize| {
-        let best = |t: &[f64]| t.iter().copied().fold(0.0, f64::max);
-        tried.iter().any(|t| t[k] > 0.0 && t[k] * (1.0 + TIE) >= best(t))
+    let names = |tried: &[Vec<f64>]| -> Vec<&'static str> {
+        let is_first = |solver: &&'static str| {
+            let best = |t: &[f64]| t.iter().copied().fold(0.0, f64::max);
+            let place = solvers.iter().position(|s| s == solver);
+            // Solvers that share first place all count; so do those behind by a difference that is no verdict.
+            place.is_some_and(|k| tried.iter().any(|t| t[k] > 0.0 && t[k] * (1.0 + TIE) >= best(t)))
+        };
+        standings.iter().map(|s| s.solver).filter(is_first).collect()
     };
-    let first: Vec<&'static str> = (0..solvers.len()).filter(|&k| is_first(k)).map(|k| solvers[k]).collect();
-    let first = standings.iter().map(|s| s.solver).filter(|name| first.contains(name)).collect();
-    Ranking { standings, first }
+    let (first, first_in) = (names(&tried), tried_in.each_ref().map(|tried| names(tried)));
+    Ranking { standings, first, first_in }
 }
 
 #[cfg(test)]
@@ -152,9 +161,9 @@ mod tests {
         let [b, a] = &found.standings[..] else { panic!("{found:?}") };
         // Ties count as fastest, and the score is of times.
         let tied = 1.0 / ((1e3 * 10.1) / (1e3 * 10.0));
-        assert_eq!((b.solver, b.score, b.holds, b.good), ("b", (1.0 + tied) / 4.0, 2, [2, 2, 0]));
-        assert_eq!((a.solver, a.score, a.holds, a.good), ("a", 1.25 / 4.0, 3, [2, 2, 1]));
-        assert_eq!(([b.fastest, b.close], [a.fastest, a.close]), ([2, 2], [1, 1]));
+        assert_eq!((b.solver, b.score, b.good), ("b", (1.0 + tied) / 4.0, [2, 2, 0]));
+        assert_eq!((a.solver, a.score, a.good), ("a", 1.25 / 4.0, [2, 2, 1]));
+        assert_eq!((b.fastest, a.fastest, a.by_class), (2, 1, [None, None, Some(1.25 / 4.0)]));
         assert_eq!(a.fails_on, ["z", "w"]);
         // Without x b scores a third of its tie, without z or w two thirds.
         assert_eq!((b.range, a.range), ([tied / 3.0, (1.0 + tied) / 3.0], [0.25 / 3.0, 1.25 / 3.0]));
@@ -178,6 +187,24 @@ mod tests {
         // Not good enough at half the tolerance.
         (records[0], records[2]) = (on("x", "a", 10.0, 6e-3), on("y", "a", 9.0, 6e-3));
         assert_eq!(ranking(&records).leader(), None);
+    }
+
+    #[test]
+    fn who_is_first_by_one_class_alone_does_not_lead() {
+        let of = |class, scene: &str, a: f64, b: f64| {
+            [("a", a), ("b", b)].map(|(solver, time)| Record { class, ..on(scene, solver, time, 1e-3) })
+        };
+        let (placed, moves) = (SceneClass::Placed, SceneClass::Moves);
+        let records = [
+            of(placed, "x", 10.0, 90.0),
+            of(placed, "y", 10.0, 90.0),
+            of(placed, "z", 10.0, 90.0),
+            of(moves, "w", 11.0, 10.0),
+        ];
+        let found = ranking(records.as_flattened());
+        // No single scene decides, but without those that are placed b is first.
+        assert_eq!((found.standings[0].solver, found.first), ("a", vec!["a", "b"]));
+        assert_eq!(found.first_in, [vec!["a"], vec![], vec!["b"]]);
     }
 
     #[test]

@@ -1,13 +1,18 @@
 //! Results of a study: one record per setting, and the records on the Pareto fronts.
 
+use super::budget;
+use super::class::SceneClass;
 use super::curve::ErrorAxis;
 use super::pareto::{self, TimeAndError};
 use super::sample::Sample;
 use super::sweep::Swept;
 use crate::engine::constraints::Impacts;
+use crate::engine::lanes::LaneWidth;
+use crate::engine::narrowphase::frozen::Freezing;
 use crate::engine::params::Budget;
 use crate::engine::solvers::find;
-use crate::engine::world::{Criterion, Divergence, Order, Quantity};
+use crate::engine::world::{Criterion, Divergence, Order, Quantity, Settings};
+use crate::lab::error::Error;
 use crate::lab::interned::{self, Name};
 use crate::lab::metrics::Errors;
 use crate::lab::overrides;
@@ -23,6 +28,9 @@ pub struct Record {
     pub scene: String,
     /// Number of bodies in the scene.
     pub bodies: usize,
+    /// Class of the scene.
+    #[serde(default)]
+    pub class: SceneClass,
     /// Step length (s).
     pub dt: f64,
     /// Name of the solver.
@@ -39,6 +47,9 @@ pub struct Record {
     /// Treatment of impacts.
     #[serde(default)]
     pub impacts: Impacts,
+    /// Treatment of frozen contacts.
+    #[serde(default)]
+    pub frozen: Freezing,
     /// Parameters of the solver, as `name=value` separated by blanks.
     #[serde(default)]
     pub parameters: String,
@@ -119,8 +130,24 @@ pub struct Later {
 
 impl Record {
     /// Key that all widths of one setting of a scene share.
-    pub fn setting(&self) -> (&'static str, Budget, Order, Impacts, Option<Swept>, &str) {
-        (self.solver, self.budget, self.order, self.impacts, self.swept, &self.parameters)
+    pub fn setting(&self) -> (&'static str, Budget, Order, Impacts, Freezing, Option<Swept>, &str) {
+        (self.solver, self.budget, self.order, self.impacts, self.frozen, self.swept, &self.parameters)
+    }
+
+    /// The settings of its run; those of a sweep of features lack the extra ones.
+    ///
+    /// Errors: a solver or a parameter that is not known, as in records of another version.
+    pub fn settings(&self) -> Result<Settings, Error> {
+        let solver = find(self.solver)?;
+        let width = LaneWidth::from_lanes(self.lanes).unwrap_or(LaneWidth::W1);
+        Ok(Settings {
+            order: self.order,
+            budget: self.budget,
+            impacts: self.impacts,
+            frozen: self.frozen,
+            parameters: overrides::of_words(solver, &self.parameters)?,
+            ..Settings::new(solver).exactly(width)
+        })
     }
 
     /// Time of a step (ns), see [`Sample::cost_ns`]; infinite without a time.
@@ -142,7 +169,7 @@ impl Record {
     /// Whether all known errors are within their tolerances at this accuracy. Failures in the extended run
     /// count.
     pub fn is_good(&self, accuracy: Accuracy) -> bool {
-        self.excess_at(accuracy) <= 1.0
+        self.excess_at(accuracy.share()) <= 1.0
     }
 
     /// Why the run does not hold; `None` if it holds.
@@ -174,13 +201,8 @@ impl Record {
         };
         text += &format!(" --substeps {}", self.budget.substeps);
         if let Ok(solver) = find(self.solver) {
-            let fields = [
-                ("velocity", self.budget.velocity_iterations, solver.uses.velocity),
-                ("relax", self.budget.relax_iterations, solver.uses.relax),
-                ("position", self.budget.position_iterations, solver.uses.position),
-            ];
-            let used = fields.into_iter().filter(|f| f.2);
-            text += &used.map(|(name, n, _)| format!(" --{name}-iterations {n}")).collect::<String>();
+            let kinds = budget::kinds(&self.budget, solver);
+            text += &kinds.map(|(name, n)| format!(" --{name}-iterations {n}")).collect::<String>();
             let own = overrides::of_words(solver, &self.parameters).unwrap_or_else(|_| solver.defaults());
             for word in overrides::changed(solver, &own).split_whitespace() {
                 text += &format!(" --set {word}");
@@ -188,6 +210,9 @@ impl Record {
         }
         if self.impacts != Impacts::Own {
             text += &format!(" --impacts {}", self.impacts.name());
+        }
+        if self.frozen != Freezing::Own {
+            text += &format!(" --frozen {}", self.frozen);
         }
         text
     }
@@ -213,31 +238,30 @@ impl Record {
 
     /// Error along an axis ÷ its tolerance; `None` if the record has no such error.
     pub fn in_tolerance(&self, axis: ErrorAxis) -> Option<f64> {
-        self.in_tolerance_at(axis, Accuracy::Plausible)
+        self.in_tolerance_at(axis, 1.0)
     }
 
-    /// The same, with the tolerance at an accuracy.
-    pub fn in_tolerance_at(&self, axis: ErrorAxis, accuracy: Accuracy) -> Option<f64> {
-        let tolerance = axis.tolerance(&self.tolerances)?.at(accuracy);
+    /// The same, with this multiple of the tolerance.
+    fn in_tolerance_at(&self, axis: ErrorAxis, share: f64) -> Option<f64> {
+        let tolerance = axis.tolerance(&self.tolerances)?.at(share);
         let error = axis.of(self)?;
         Some(if error > 0.0 { error / tolerance } else { 0.0 })
     }
 
     /// The largest error ÷ tolerance for a plausible run, see [`Self::excess_at`].
     pub fn excess(&self) -> f64 {
-        self.excess_at(Accuracy::Plausible)
+        self.excess_at(1.0)
     }
 
-    /// The largest error ÷ tolerance: all errors are within their tolerances up to 1. Infinite for a run that
-    /// does not hold, that never reached the event of the reference value, or that fallback sweeps solved
+    /// The largest error ÷ this multiple of its tolerance: all are within up to 1. Infinite for a run that does not hold, that never reached the event of the reference value, or that fallback sweeps solved
     /// instead of the solver's own method.
-    pub fn excess_at(&self, accuracy: Accuracy) -> f64 {
+    pub fn excess_at(&self, share: f64) -> f64 {
         let known = |axis: &ErrorAxis| match axis {
             ErrorAxis::Truth => self.truth.is_some() && self.tolerances.truth.is_some(),
             axis => axis.tolerance(&self.tolerances).is_some(),
         };
         let judged = ErrorAxis::JUDGED.into_iter().filter(known);
-        let worst = judged.map(|axis| self.in_tolerance_at(axis, accuracy).unwrap_or(f64::INFINITY));
+        let worst = judged.map(|axis| self.in_tolerance_at(axis, share).unwrap_or(f64::INFINITY));
         let fell = self.later.is_some_and(|later| later.broken.is_some());
         if self.holds() && !fell && !self.is_unsolved() { worst.fold(0.0, f64::max) } else { f64::INFINITY }
     }
@@ -348,6 +372,7 @@ pub(crate) mod tests {
         Record {
             scene: "stack:2".to_string(),
             bodies: 3,
+            class: SceneClass::Moves,
             dt: 0.01,
             solver: "pgs",
             order: Order::Colored,
@@ -355,6 +380,7 @@ pub(crate) mod tests {
             budget: Budget { substeps, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
             budget_text: format!("{substeps} sub"),
             impacts: Impacts::Own,
+            frozen: Freezing::Own,
             parameters: String::new(),
             swept: None,
             sample: Some(sample),

@@ -7,7 +7,7 @@
 //! clock is read and all cores can work:
 //!
 //! ```text
-//! 54 candidates ─ 1/16 of the run ─► a quarter ─ 1/4 of the run ─► 6 ─ whole run ─► at most 3, which a study times
+//! 54 candidates ─ 1/16 of the run ─► a quarter ─ 1/4 of the run ─► 6 ─ whole run ─► at most 5, which a study times
 //! ```
 //!
 //! A candidate has an excess over the tolerances of the scene and a *work*: the sweeps and substeps of an
@@ -15,9 +15,9 @@
 //! another one with at most as much work and less excess. This is successive halving (Jamieson and Talwalkar,
 //! "Non-stochastic best arm identification and hyperparameter optimization", 2016), with fronts instead of
 //! one loss. Unbeaten candidates are never dropped: before the first contact, short runs show no difference.
-//! Of the last candidates, a study times those with the least work that are plausible, tight and exact. Each
-//! of these must stand for a minute if the scene should come to rest. If they are fewer than three, the next
-//! plausible ones are added. If none of the last candidates is plausible, the dropped ones get whole runs as
+//! Of the last candidates, a study times those with the least work at each of the [`LEVELS`] of the
+//! tolerances. Each of these must stand for a minute if the scene should come to rest. If they are fewer than
+//! three, the next plausible ones are added. If none of the last candidates is plausible, the dropped ones get whole runs as
 //! well, until one is. So no solver fails on a scene because of candidates that only had short runs.
 
 use super::found::{FoundBudgets, TunedBudget};
@@ -26,11 +26,14 @@ use super::{ErrorCell, FailedAt, Record, RecordRow, StudyPlan};
 use super::{leave_out_unseen, observe_until_broken, record_of, settings};
 use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
+use crate::engine::narrowphase::frozen::Freezing;
 use crate::engine::params::{Budget, Parameter, Parameters};
 use crate::engine::solvers::Variant;
 use crate::engine::world::Order;
 use crate::lab::error::Error;
+use crate::lab::scenes::holds::Demand;
 use crate::lab::scenes::tolerance::Accuracy;
+use crate::lab::scenes::{Loaded, Scene};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64;
@@ -54,16 +57,20 @@ pub const STIFFNESS: [(&str, &[f32]); 4] = [
 
 /// Fractions of a run (as divisors) after which a quarter of the candidates remains.
 const PARTS: [u32; 2] = [16, 4];
-/// Minimum number of candidates with whole runs, and maximum number of timed settings.
+/// Minimum number of candidates with whole runs, and minimum number of timed settings if as many are plausible.
 const LAST: usize = 6;
 const TIMED: usize = 3;
+/// Multiples of the tolerances at which the setting of least work is searched: those of
+/// [`Accuracy::ALL`](crate::lab::scenes::tolerance::Accuracy::ALL), and those by which a
+/// [ranking](super::ranking) varies.
+pub const LEVELS: [f64; 5] = [2.0, 1.0, 0.5, 0.1, 0.01];
 
 /// The rule in one sentence, for pages.
 pub fn rule() -> String {
     let list = |values: &[u32]| values.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
     format!(
         "substeps {} × sweeps {} (at most {MOST_SWEEPS} in a step) × stiffness, at most {MOST} settings for each solver and scene, \
-         in colored order, by successive halving on errors; timed are those of least work that are plausible, tight and exact",
+         in colored order, by successive halving on errors; timed are those of least work at 2, 1, 0.5, 0.1 and 0.01 times the tolerances",
         list(&SUBSTEPS),
         list(&SWEEPS)
     )
@@ -78,11 +85,11 @@ pub fn search(
     name: &str,
     tell: &(dyn Fn(f64, String) + Sync),
 ) -> Result<Vec<FoundBudgets>, Error> {
-    let scene = plan.open(name)?.scene;
+    let Loaded { scene, demands, .. } = plan.open(name)?;
     let solvers = plan.solvers.iter().filter(|solver| scene.runs_on(solver).is_ok());
     let jobs: Vec<SearchJob> = solvers
         .flat_map(|&solver| plan.impacts_on(&scene).iter().map(move |&impacts| (solver, impacts)))
-        .map(|(solver, impacts)| SearchJob { plan, name, solver, impacts })
+        .map(|(solver, impacts)| SearchJob { plan, name, scene: &scene, demands: &demands, solver, impacts })
         .collect();
     let (done, total) = (AtomicUsize::new(0), jobs.len() as f64);
     in_parallel(&jobs, |job| {
@@ -169,6 +176,8 @@ pub fn parameters<'a>(solver: &Variant, h: f32, trials: impl Fn(&Parameter) -> &
 struct SearchJob<'a> {
     plan: &'a StudyPlan,
     name: &'a str,
+    scene: &'a Scene,
+    demands: &'a [Demand],
     solver: &'static Variant,
     impacts: Impacts,
 }
@@ -184,7 +193,7 @@ struct SearchTrial {
 impl SearchTrial {
     /// Excess over the strictest tolerances. All values within them count as equal.
     fn excess(&self) -> f64 {
-        self.record.excess_at(Accuracy::Exact).max(1.0)
+        self.record.excess_at(Accuracy::Exact.share()).max(1.0)
     }
 
     fn is_plausible(&self) -> bool {
@@ -195,11 +204,11 @@ impl SearchTrial {
 impl SearchJob<'_> {
     /// The settings to time, the least work first.
     fn best(&self) -> Result<Vec<TunedBudget>, Error> {
-        let scene = self.plan.open(self.name)?.scene;
-        let mut left = candidates(self.solver, scene.dt);
+        let mut left = candidates(self.solver, self.scene.dt);
+        let rests = self.demands.iter().any(|d| matches!(d, Demand::Rests));
         let mut dropped = Vec::new();
         for part in PARTS {
-            let trials = self.judged(&left, Some((scene.steps / part).max(1)))?;
+            let trials = self.judged(&left, Some((self.scene.steps / part).max(1)))?;
             let points: Vec<[f64; 2]> = trials.iter().map(|t| [t.work, t.excess()]).collect();
             let fronts = by_fronts(&points);
             let unbeaten = fronts.first().map_or(0, Vec::len);
@@ -212,13 +221,13 @@ impl SearchJob<'_> {
         let mut dropped = dropped.into_iter();
         loop {
             let chosen = choose(&trials);
-            let unknown = chosen
-                .iter()
-                .copied()
-                .find(|&i| trials[i].record.later.is_none() && trials[i].is_plausible());
-            if let Some(i) = unknown.filter(|_| self.rests()) {
-                trials[i].record.later = Some(self.later(&trials[i].candidate)?);
-            } else if let Some(next) = dropped.next().filter(|_| chosen.is_empty()) {
+            let unknown = chosen.iter().copied().find(|&i| rests && trials[i].record.later.is_none());
+            let none = !chosen.iter().any(|&i| trials[i].is_plausible());
+            if let Some(i) = unknown {
+                let (order, width) = self.order();
+                let own = settings(self.plan, &self.cell(&trials[i].candidate), order, width);
+                trials[i].record.later = Some(later(self.scene, self.demands, own)?);
+            } else if let Some(next) = dropped.next().filter(|_| none) {
                 trials.extend(self.judged(&[next], self.plan.steps)?);
             } else if chosen.is_empty() {
                 // The nearest candidate. If none holds, the standard budget, which a reader expects.
@@ -232,13 +241,10 @@ impl SearchJob<'_> {
         }
     }
 
-    fn rests(&self) -> bool {
-        self.plan.open(self.name).is_ok_and(|loaded| loaded.rests())
-    }
-
     fn cell(&self, &tuned: &TunedBudget) -> ErrorCell {
         let SearchJob { solver, impacts, .. } = *self;
-        ErrorCell { point: 0, swept: None, solver, impacts, tuned, widest_alone: false }
+        let frozen = Freezing::Own;
+        ErrorCell { point: 0, swept: None, solver, impacts, frozen, tuned, widest_alone: false }
     }
 
     /// All widths of colored order give the same bits. The plan may contain natural order only.
@@ -249,21 +255,15 @@ impl SearchJob<'_> {
         }
     }
 
-    fn later(&self, candidate: &TunedBudget) -> Result<super::record::Later, Error> {
-        let (order, width) = self.order();
-        later(&self.plan.open(self.name)?, settings(self.plan, &self.cell(candidate), order, width))
-    }
-
     /// Runs candidates for `steps` steps, or for those of the scene.
     fn judged(&self, list: &[TunedBudget], steps: Option<u32>) -> Result<Vec<SearchTrial>, Error> {
         let plan = StudyPlan { steps, ..self.plan.clone() };
         let (order, width) = self.order();
         let (mut records, mut works) = (Vec::new(), Vec::new());
-        let loaded = plan.open(self.name)?;
         for candidate in list {
-            let cell = self.cell(candidate);
+            let (cell, mut loaded) = (self.cell(candidate), plan.open(self.name)?);
             let given = settings(&plan, &cell, order, width);
-            let (outcome, work) = observe_until_broken(plan.open(self.name)?, given)?;
+            let (outcome, work) = observe_until_broken(&mut loaded, given)?;
             let row = RecordRow { cell: &cell, order, width, outcome: &outcome };
             let failure = outcome.errors.as_ref().err().map(|&d| FailedAt::from(d));
             records.push(record_of(&plan, &loaded, &row, None, failure));
@@ -271,25 +271,27 @@ impl SearchJob<'_> {
         }
         let is_last = plan.only_given && steps == self.plan.steps;
         if steps.is_some() && !is_last {
-            leave_out_unseen(&mut records, &loaded.scene);
+            leave_out_unseen(&mut records, steps.unwrap_or(self.scene.steps));
         }
         let trials = list.iter().zip(records).zip(works);
         Ok(trials.map(|((&candidate, record), work)| SearchTrial { candidate, record, work }).collect())
     }
 }
 
-/// Indices of the settings to time: the least work at each accuracy, then the next plausible ones. Sorted by
-/// work.
+/// Indices of the settings to time: the least work at each of the [`LEVELS`], then the next plausible ones. Sorted
+/// by work.
 fn choose(trials: &[SearchTrial]) -> Vec<usize> {
-    let mut sorted: Vec<usize> = (0..trials.len()).filter(|&i| trials[i].is_plausible()).collect();
+    let within = |i: usize, level: f64| trials[i].record.excess_at(level) <= 1.0;
+    let mut sorted: Vec<usize> = (0..trials.len()).filter(|&i| within(i, LEVELS[0])).collect();
     sorted.sort_by(|&a, &b| {
         let key = |i: usize| (trials[i].work, trials[i].excess());
         let (a, b) = (key(a), key(b));
         a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
     });
-    let cheapest = |accuracy| sorted.iter().copied().find(|&i| trials[i].record.is_good(accuracy));
-    let mut chosen: Vec<usize> = Vec::new();
-    for i in Accuracy::ALL.into_iter().filter_map(cheapest).chain(sorted.iter().copied()) {
+    let cheapest = |level| sorted.iter().copied().find(|&i| within(i, level));
+    let mut chosen: Vec<usize> = LEVELS.into_iter().filter_map(cheapest).collect();
+    chosen.dedup();
+    for &i in sorted.iter().filter(|&&i| within(i, 1.0)) {
         if chosen.len() < TIMED && !chosen.contains(&i) {
             chosen.push(i);
         }

@@ -2,13 +2,10 @@
 
 use super::answer::Answer;
 use super::curve::solvers_of;
-use super::found::TunedBudget;
-use super::{ErrorCell, Record, StudyPlan, settings};
-use crate::engine::lanes::LaneWidth;
+use super::{Record, StudyPlan};
 use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
-use crate::lab::overrides;
-use crate::lab::recording::record::{Caption, Recorder};
+use crate::lab::recording::record::{Caption, record_trial};
 use crate::lab::trial::Trial;
 use crate::lab::units::lanes;
 use std::cmp::Reverse;
@@ -78,30 +75,14 @@ fn recording(plan: &StudyPlan, record: &Record) -> Result<Vec<u8>, Error> {
             loaded = Some(opened);
         }
     }
-    let solver = plan.solvers.iter().find(|v| v.name == record.solver).copied();
-    let (Some(mut loaded), Some(solver)) = (loaded, solver) else {
+    let Some(mut loaded) = loaded else {
         return Err(Error::invalid("replay", format!("no run of {} on {}", record.solver, record.scene)));
     };
-    let Record { impacts, budget, .. } = *record;
-    let tuned = TunedBudget { budget, parameters: overrides::of_words(solver, &record.parameters)? };
-    let cell = ErrorCell { point: 0, swept: None, solver, impacts, tuned, widest_alone: false };
-    let width = LaneWidth::from_lanes(record.lanes).unwrap_or(LaneWidth::W1);
-    let own = settings(plan, &cell, record.order, width);
     let setting = format!("{}, {}", record.budget_text, lanes(record.lanes));
     let caption = Caption { scene: record.scene.clone(), solver: record.solver.into(), setting };
-    let mut recorder: Option<Recorder> = None;
-    let trial = Trial { measured: 0, ..Trial::of(&mut loaded, Settings { record_impulses: true, ..own }) };
-    let every = trial.scene.steps.div_ceil(FRAMES);
-    let found = trial.run(&mut |world| match &mut recorder {
-        Some(recorder) => recorder.add(world),
-        None => {
-            recorder = Some(Recorder::new(world, caption.clone(), every, true));
-            Ok(())
-        }
-    })?;
-    let blew_up = found.failure.map(|d| format!("blew up at step {}", d.step));
-    let outcome = blew_up.or(found.broken.map(|b| b.to_string())).unwrap_or("holds".into());
-    recorder.map_or(Ok(Vec::new()), |recorder| recorder.finish(&outcome))
+    let every = loaded.scene.steps.div_ceil(FRAMES);
+    let trial = Trial::of(&mut loaded, Settings { record_impulses: true, ..record.settings()? });
+    Ok(record_trial(trial, &|_| caption.clone(), every, true, &mut |_| ())?.0)
 }
 
 #[cfg(test)]

@@ -107,8 +107,7 @@ fn sections(
         }
         return vec![("sweep", "Sweep", blocks), machine];
     }
-    let steps = study.settings["steps"].as_u64().map(|n| n as u32);
-    let mut answer = answer::blocks(records, &study.environment, steps);
+    let mut answer = answer::blocks(records, &study.environment, study.steps());
     answer.push(plain(&study.budgets()));
     let overview = match charts::overview(records) {
         Some(chart) => vec![
@@ -164,6 +163,11 @@ fn sections(
     ];
     profiles.extend(by_scene::order_tables(records).into_iter().map(DocBlock::Table));
     made.push(("profiles", "Performance profiles", profiles));
+    let compared = by_scene::treatment_tables(records);
+    if !compared.is_empty() {
+        let tables = compared.into_iter().map(DocBlock::Table).collect();
+        made.push(("treatments", "Impacts and frozen contacts", tables));
+    }
     let lanes = charts::over_lanes(records);
     if !lanes.is_empty() {
         let lead = "Each solver at the middle one of its budgets in colored order: speed-up over one lane, and the share of lanes that hold a contact.";
@@ -290,6 +294,7 @@ fn command(settings: &Value) -> String {
     option("lanes", list(&settings["lanes"]));
     option("orders", list(&settings["orders"]));
     option("impacts", list(&settings["impacts"]));
+    list(&settings["frozen"]).into_iter().for_each(|limits| option("frozen", vec![limits]));
     for name in ["substeps", "velocity_iterations", "relax_iterations", "position_iterations"] {
         option(&name.replace('_', "-"), list(&settings["budgets"][name]));
     }
