@@ -33,7 +33,7 @@ use crate::constraints::records::point_vector::{
     Wide, difference, dot, plus_scaled, quotient, scaled, sum_of_products, update,
 };
 use crate::constraints::vectors::spectral::ImpulseProblem;
-use crate::constraints::{ImpactLaw, Passes, Solver, numerics::cone};
+use crate::constraints::{Passes, Solver, numerics::cone};
 use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
@@ -47,7 +47,6 @@ pub static SOLVER: Variant = Variant {
         (Law::Converges, "to the convex relaxation, which is another law"),
         (Law::Rest, "gradients spread a load more slowly than sweeps"),
     ],
-    impacts: ImpactLaw::None,
     make: Variant::made_by(|| Box::new(Apgd::default())),
     ..Variant::BASE
 };
@@ -77,11 +76,12 @@ fn step(passes: &mut Passes<'_>, steepness: &mut f64) {
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.warm_start();
+        let rebounds = passes.rebounds();
         let [bias, mass, mut now, mut next, mut y] = [(); 5].map(|_| passes.vector());
         let mut problem = ImpulseProblem { bias, mass };
         let [mut g_now, mut g_next, mut g_y, mut step] = [(); 4].map(|_| passes.vector());
         passes.with_system(Phase::Solve, |system| {
-            problem.begin(system, &rule, true);
+            problem.begin(system, &rule, rebounds.as_ref(), true);
             system.lane_impulses(&mut now);
             problem.gradient(system, &mut now, &mut g_now);
             y.clone_from(&now);
@@ -151,6 +151,7 @@ fn step(passes: &mut Passes<'_>, steepness: &mut f64) {
             passes.iteration_done();
         }
         passes.give_back([problem.bias, problem.mass, now, next, y]);
+        passes.give_back(rebounds);
         passes.give_back([g_now, g_next, g_y, step]);
         passes.integrate_positions();
         passes.end_substep(substep);

@@ -27,7 +27,7 @@ use super::{Law, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::vectors::spectral::{Axes, ImpulseProblem, SpectralDescent};
-use crate::constraints::{ImpactLaw, Passes, Schedule, numerics::cone};
+use crate::constraints::{Passes, Schedule, numerics::cone};
 use crate::params::{Budget, Parameter};
 
 /// See the [module](self).
@@ -38,7 +38,6 @@ pub static SOLVER: Variant = Variant {
     budget: Budget { substeps: 1, velocity_iterations: 20, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
     breaks: &[(Law::Converges, "to the convex relaxation, which is another law")],
-    impacts: ImpactLaw::None,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
@@ -49,10 +48,11 @@ fn step(passes: &mut Passes<'_>) {
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.warm_start();
+        let rebounds = passes.rebounds();
         let mut problem = ImpulseProblem { bias: passes.vector(), mass: passes.vector() };
         let mut descent = SpectralDescent::new([(); 6].map(|_| passes.vector()));
         passes.with_system(Phase::Solve, |system| {
-            problem.begin(system, &rule, true);
+            problem.begin(system, &rule, rebounds.as_ref(), true);
             descent.begin(system, &problem, Axes::Both, cone::project_point);
         });
         for _ in 0..budget.velocity_iterations {
@@ -65,6 +65,7 @@ fn step(passes: &mut Passes<'_>) {
         }
         passes.with_system(Phase::Solve, |system| descent.end(system));
         passes.give_back(descent.vectors());
+        passes.give_back(rebounds);
         passes.give_back([problem.bias, problem.mass]);
         passes.integrate_positions();
         passes.end_substep(substep);

@@ -48,7 +48,7 @@ use crate::constraints::numerics::block_lu::BlockLu;
 use crate::constraints::numerics::cone;
 use crate::constraints::vectors::blocks::JointBlocks;
 use crate::constraints::vectors::system::{Pair, PointRows};
-use crate::constraints::{ImpactLaw, Passes, Schedule, System};
+use crate::constraints::{Passes, PointVector, Schedule, System};
 use crate::disjoint::DisjointSets;
 use crate::lanes::BodyRow;
 use crate::params::{Budget, Parameter};
@@ -91,7 +91,6 @@ pub static SOLVER: Variant = Variant {
         (Law::NoAllocation, "matrices are as large as the scene"),
         (Law::Rest, "large scenes have 8 sweeps, too few for tall stacks"),
     ],
-    impacts: ImpactLaw::None,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
@@ -125,15 +124,16 @@ fn step(passes: &mut Passes<'_>) {
         for _ in 0..sweeps {
             passes.sweep(Phase::Solve, &sweep);
         }
-        let points = passes.points();
+        let (points, mut rebounds) = (passes.points(), passes.rebounds());
         let is_small = points <= largest;
         let begin = |system: &mut System<'_>| {
             let joints =
                 if is_small && system.has_joints() { system.joint_blocks() } else { JointBlocks::default() };
             let rows = joints.blocks.iter().map(|block| block.size).sum::<usize>();
-            (is_small && points + rows / 2 <= largest).then(|| Newton::new(system, &rule, joints, h))
+            (is_small && points + rows / 2 <= largest).then(|| Newton::new(system, &rule, rebounds.as_mut(), joints, h))
         };
         let mut newton = passes.with_system(Phase::Solve, begin);
+        passes.give_back(rebounds);
         if newton.is_none() {
             passes.count_unsolved();
         }
@@ -159,12 +159,25 @@ struct Newton {
 }
 
 impl Newton {
-    fn new(system: &mut System<'_>, rule: &Baumgarte, joints: JointBlocks, h: f32) -> Self {
+    /// Points with a rebound speed u > 0 have the bias −u.
+    fn new(
+        system: &mut System<'_>,
+        rule: &Baumgarte,
+        rebounds: Option<&mut PointVector>,
+        joints: JointBlocks,
+        h: f32,
+    ) -> Self {
         let [mut written, mut velocities, mut surfaces] = [(); 3].map(|_| Vec::new());
         system.impulses(&mut written);
         system.relative_velocities(&mut velocities);
         system.gaps_and_friction(&mut surfaces);
-        velocities.iter_mut().zip(&surfaces).for_each(|(v, [gap, _])| v[0] += rule.bias(*gap));
+        let mut targets = vec![[0.0; 2]; surfaces.len()];
+        if let Some(rebounds) = rebounds {
+            system.pairs(rebounds, &mut targets);
+        }
+        for ((v, [gap, _]), [u, _]) in velocities.iter_mut().zip(&surfaces).zip(&targets) {
+            v[0] += if *u > 0.0 { -u } else { rule.bias(*gap) };
+        }
         let points: Vec<PointRows> = system.point_rows().collect();
         let islands = parts(system.rows(), points, &joints).into_iter().map(|(points, blocks)| {
             let mut law = IslandLaw::new(points, system.rows(), &written, &velocities, &surfaces);

@@ -34,7 +34,7 @@ use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::kernels::velocity::sweep::Sweep;
 use crate::constraints::records::point_vector::{PointEntry, Wide};
 use crate::constraints::vectors::spectral::{Axes, ImpulseProblem, SpectralDescent};
-use crate::constraints::{ImpactLaw, Passes, Schedule};
+use crate::constraints::{Passes, Schedule};
 use crate::lanes::Lanes;
 use crate::params::{Budget, Parameter};
 
@@ -59,7 +59,6 @@ pub static SOLVER: Variant = Variant {
         Law::Converges,
         "to the law of `pgs` where rounds settle, but roundings grow in its inner iterations",
     )],
-    impacts: ImpactLaw::None,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };
@@ -71,9 +70,10 @@ fn step(passes: &mut Passes<'_>) {
     for substep in 0..budget.substeps {
         passes.integrate_velocities();
         passes.warm_start();
+        let rebounds = passes.rebounds();
         let mut problem = ImpulseProblem { bias: passes.vector(), mass: passes.vector() };
         let mut descent = SpectralDescent::new([(); 6].map(|_| passes.vector()));
-        passes.with_system(Phase::Solve, |system| problem.begin(system, &rule, false));
+        passes.with_system(Phase::Solve, |system| problem.begin(system, &rule, rebounds.as_ref(), false));
         for _ in 0..budget.velocity_iterations {
             solve(passes, &problem, &mut descent, inner, Axes::Normal, pushing);
             solve(passes, &problem, &mut descent, inner, Axes::Tangent, within_friction);
@@ -81,6 +81,7 @@ fn step(passes: &mut Passes<'_>) {
         }
         passes.solves(&Sweep(rule));
         passes.give_back(descent.vectors());
+        passes.give_back(rebounds);
         passes.give_back([problem.bias, problem.mass]);
         passes.integrate_positions();
         passes.end_substep(substep);

@@ -12,6 +12,8 @@
 //! the side record. Friction rows are unchanged. Scenes without bounces have neither the sweep nor the side
 //! records.
 //!
+//! Solvers of vectors read the same u into the right-hand side of their problem instead, b = −u ([`ReadTargets`]).
+//!
 //! Source: `catto2007box2d` (`b2ContactSolver`, velocity bias, Box2D 1 to 2.4).
 
 use super::restitution::{largest, point, restitution_of};
@@ -19,8 +21,9 @@ use crate::constraints::kernels::pass::{Pass, PassInput};
 use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
 use crate::constraints::records::bounces::Bounces;
 use crate::constraints::records::features::{KernelFeatures, Layout};
+use crate::constraints::records::point_vector::places;
 use crate::contacts::Contact;
-use crate::lanes::{BodyRow, Lanes};
+use crate::lanes::{Block, BodyRow, Lanes};
 
 /// Side record: per point u (m/s; zero if it does not bounce) and its effective mass (kg).
 pub(super) const fn stride(points: usize) -> usize {
@@ -42,6 +45,13 @@ pub struct FindBounces {
 /// One sweep over the points that bounce.
 pub struct BiasSweep;
 
+/// Reads u of every point into the normal entries of a vector, and restores effective masses: the rows of points
+/// that bounce become rows like the others.
+pub struct ReadTargets<'a> {
+    /// Entries of the colored and of the serial batches.
+    pub to: [&'a mut [Block]; 2],
+}
+
 impl Pass for FindBounces {
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         on.bounces.reserve(on.batches.lanes(), stride(F::POINTS));
@@ -55,6 +65,23 @@ impl Pass for BiasSweep {
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         on.batches.each_segment(F::layout, |batches, segment, layout| {
             sweep::<L>(on.rows, batches, segment, layout, on.bounces);
+        });
+    }
+}
+
+impl Pass for ReadTargets<'_> {
+    fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
+        let to: &mut [L] = bytemuck::cast_slice_mut(self.to[on.part as usize]);
+        on.batches.each_segment(F::layout, |batches, segment, layout| {
+            let records = batches.records_of::<L>(segment, layout).records.chunks_exact_mut(layout.stride);
+            for (batch, (record, side)) in records.zip(on.bounces.of::<L>(segment)).enumerate() {
+                for p in 0..layout.points {
+                    let at = layout.at(p, layout.normal_mass);
+                    let (target, mass) = (side[2 * p], side[2 * p + 1]);
+                    record[at] = target.select_positive(mass, record[at]);
+                    to[places::<L>(segment.first_slot + batch * L::WIDTH, p)[0]] = target;
+                }
+            }
         });
     }
 }

@@ -390,6 +390,14 @@ impl Batches {
         4 * (self.vectors * self.width + 2 * self.contact.len() - static_lanes)
     }
 
+    /// Slot in vectors over contact points, and index, of every contact.
+    pub fn slots(&self) -> impl Iterator<Item = (usize, u32)> {
+        self.segments.iter().flat_map(|segment| {
+            let contacts = &self.contact[segment.first_lane..][..segment.contacts];
+            (segment.first_slot..).zip(contacts.iter().copied())
+        })
+    }
+
     /// Calls `visit(contact, record, lane)` for every lane that holds a contact, where
     /// quantity `q` of the contact is `record[q · width + lane]`.
     ///

@@ -8,6 +8,7 @@ use crate::constraints::impacts::{ImpactLaw, bias, restitution};
 use crate::constraints::kernels::pass::PassMode;
 use crate::constraints::records::batches::Part;
 use crate::constraints::records::bounces::Bounces;
+use crate::constraints::records::point_vector::PointVector;
 use crate::params::RESTITUTION_THRESHOLD;
 
 /// How impacts spread; see [`spread`].
@@ -123,6 +124,16 @@ impl Passes<'_> {
         let mut begin = bias::FindBounces { h, is_first, slowest, fastest: 0.0 };
         self.over_contacts(&mut begin);
         self.biased = begin.fastest > 0.0;
+    }
+
+    /// Rebound speeds of points in the coming substep (m/s; zero if a point does not bounce), as normal entries;
+    /// `None` if nothing bounces. The solver takes over their rows: sweeps that follow treat them as any other.
+    pub fn rebounds(&mut self) -> Option<PointVector> {
+        let mut rebounds = self.biased.then(|| self.vector())?;
+        self.over_contacts(&mut bias::ReadTargets { to: self.parts_of(&mut rebounds) });
+        self.biased = false;
+        self.clock.lap(Phase::Restitution);
+        Some(rebounds)
     }
 
     /// Solves the rows of points that bounce, after a sweep over the others.

@@ -49,11 +49,20 @@ pub enum Axes {
 }
 
 impl ImpulseProblem {
-    /// Reads the problem of a step. `rule` pushes overlap apart. With `alike`, D is the same along n and
-    /// t, so that cones stay cones.
-    pub fn begin(&mut self, system: &mut System<'_>, rule: &Baumgarte, alike: bool) {
+    /// Reads the problem of a step. `rule` pushes overlap apart. Points with a rebound speed u > 0 have b = −u
+    /// instead: the row requires J v ≥ u. With `alike`, D is the same along n and t, so that cones stay cones.
+    pub fn begin(
+        &mut self,
+        system: &mut System<'_>,
+        rule: &Baumgarte,
+        rebounds: Option<&PointVector>,
+        alike: bool,
+    ) {
         system.lane_surfaces(&mut self.bias);
         update([&mut self.bias], [], |[b], []| [[rule.bias(b[0]), b[1]]]);
+        if let Some(rebounds) = rebounds {
+            update([&mut self.bias], [rebounds], |[b], [u]| [[u[0].select_positive(-u[0], b[0]), b[1]]]);
+        }
         system.lane_bias(rule.of_errors(), &mut self.bias);
         system.lane_masses(&mut self.mass);
         if alike {

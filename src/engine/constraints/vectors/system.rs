@@ -14,7 +14,7 @@ use crate::constraints::kernels::velocity::rules::Softness;
 use crate::constraints::numerics::cone;
 use crate::constraints::records::batches::{Batches, Part};
 use crate::constraints::records::features::{Features, Layout};
-use crate::constraints::records::point_vector::PointVector;
+use crate::constraints::records::point_vector::{PointVector, places};
 use crate::constraints::vectors::passes::{self, VectorInput};
 use crate::contacts::Contact;
 use crate::lanes::{Block, BodyRow, LaneWidth};
@@ -213,6 +213,23 @@ impl<'a> System<'a> {
         each_record(&mut self.batches, self.features, |at, normal, tangent| {
             to[at] = [*normal, tangent.map_or(0.0, |t| *t)];
         });
+    }
+
+    /// The entries of a vector, in contact order. Absent points stay unchanged.
+    ///
+    /// # Panics
+    /// If `to` is not [`Self::len`] long, or the vector belongs to other contacts.
+    pub fn pairs(&self, from: &mut PointVector, to: &mut [Pair]) {
+        let [lanes, serial] = &self.batches;
+        for (batches, from) in [lanes, serial].into_iter().zip(from.parts([lanes, serial])) {
+            let from: &[f32] = bytemuck::cast_slice(from);
+            for (slot, contact) in batches.slots() {
+                let contact = contact as usize;
+                for p in 0..self.contacts[contact].manifold.count as usize {
+                    to[2 * contact + p] = places::<f32>(slot, p).map(|at| from[at]);
+                }
+            }
+        }
     }
 
     /// Replaces all accumulated impulses (N·s). Velocities do not change.
