@@ -299,7 +299,8 @@ proptest! {
         let (mut shapes, mut shape_body) = (Vec::new(), Vec::new());
         for i in 0..12 {
             let kind = [BodyKind::Dynamic, BodyKind::Dynamic, BodyKind::Kinematic][i % 3];
-            bodies.push(&body_def(kind, [f64::from(far) + i as f64, 0.0]), &MassProperties::ZERO);
+            let def = BodyDef::new(kind, [f64::from(far) + i as f64, 0.0], Vec::new()).with_angle(0.3);
+            bodies.push(&def, &MassProperties::ZERO);
             for shape in &assortment()[i % 4..=i % 4 + i % 2] {
                 shapes.push(*shape);
                 shape_body.push(i as u32);
@@ -341,22 +342,6 @@ proptest! {
 /// Rounding error of bounds: four units in the last place of the largest coordinate.
 fn rounding(aabb: &Aabb) -> f32 {
     4.0 * f32::EPSILON * aabb.min.abs().max(aabb.max.abs()).max_element()
-}
-
-fn body_def(kind: BodyKind, position: [f64; 2]) -> BodyDef {
-    BodyDef {
-        kind,
-        position,
-        angle: 0.3,
-        velocity: [0.0; 2],
-        angular_velocity: 0.0,
-        gravity_scale: 1.0,
-        linear_damping: 0.0,
-        angular_damping: 0.0,
-        group: 0,
-        bullet: false,
-        shapes: Vec::new(),
-    }
 }
 
 /// One of each shape, off center.

@@ -147,9 +147,7 @@ fn gases_of_smooth_elastic_boxes_keep_their_energy() {
             let settings = Settings { without, ..crate::common::settings(shim) };
             let mut world = gas(125 * seed).build(settings).unwrap();
             let [.., before] = totals(&world);
-            for _ in 0..1200 {
-                world.step().unwrap();
-            }
+            (0..1200).for_each(|_| world.step().unwrap());
             let [.., after] = totals(&world);
             (after / before - 1.0).powi(2)
         };
@@ -166,9 +164,7 @@ fn gases_of_smooth_elastic_boxes_keep_their_energy() {
 fn its_bits_are_the_same_at_every_width() {
     let run = |width: LaneWidth| {
         let mut world = gas(0).build(crate::common::with_width(find(DEFAULT).unwrap(), width)).unwrap();
-        for _ in 0..300 {
-            world.step().unwrap();
-        }
+        (0..300).for_each(|_| world.step().unwrap());
         (0..world.bodies.len()).map(|i| world.bodies.center(i).map(f64::to_bits)).collect::<Vec<_>>()
     };
     let all = [LaneWidth::W1, LaneWidth::W4, LaneWidth::W8, LaneWidth::W16].map(run);
@@ -198,9 +194,7 @@ proptest! {
         let scene = Scene::new("discs", bodies).weightless();
         let mut world = scene.build(crate::common::settings(find(DEFAULT).unwrap())).unwrap();
         let before = totals(&world);
-        for _ in 0..60 {
-            world.step().unwrap();
-        }
+        (0..60).for_each(|_| world.step().unwrap());
         let after = totals(&world);
         for k in 0..3 {
             prop_assert!((after[k] - before[k]).abs() < 2e-5 * speed, "{before:?}, then {after:?}");

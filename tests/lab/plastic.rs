@@ -41,9 +41,7 @@ proptest! {
         let scene = pair(angles, offset, speed, spins, friction, density);
         let mut world = scene.build(crate::common::settings(find(DEFAULT).unwrap())).unwrap();
         let before = totals(&world);
-        for _ in 0..60 {
-            world.step().unwrap();
-        }
+        (0..60).for_each(|_| world.step().unwrap());
         let after = totals(&world);
         let scale = before[0].hypot(before[1]).max(1.0);
         for k in 0..2 {

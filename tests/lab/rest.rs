@@ -1,15 +1,9 @@
 //! The law of rest: piles of a few boxes stay in place at the standard budget.
 
-use crate::common::fastest;
+use crate::common::{fastest, totals};
 use simpulse::engine::bodies::{BodyDef, BodyHandle, ShapeDef};
-use simpulse::engine::clock::Phase;
-use simpulse::engine::constraints::kernels::velocity::rules::{
-    Frictionless, NormalRule, Soft, angular_frequencies,
-};
-use simpulse::engine::constraints::{Passes, Schedule};
-use simpulse::engine::lanes::Lanes;
-use simpulse::engine::params::{CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, Without};
-use simpulse::engine::solvers::{Law, VARIANTS, Variant, find, rapier};
+use simpulse::engine::params::Without;
+use simpulse::engine::solvers::{Law, VARIANTS, Variant, find};
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 
@@ -123,16 +117,7 @@ fn lemke_and_newton_agree_on_a_stack() {
 /// Root mean square of √(2 E_kin/M) over the third second of a scene (mm/s). `after` is called after each
 /// step. With `parts`, each substep of the standard budget becomes `parts` steps of one substep.
 fn residual_speed(scene: &Scene, solver: &str, parts: Option<u32>, after: impl Fn(&mut World)) -> f64 {
-    residual_speed_of(scene, find(solver).unwrap(), parts, after)
-}
-
-fn residual_speed_of(
-    scene: &Scene,
-    solver: &'static Variant,
-    parts: Option<u32>,
-    after: impl Fn(&mut World),
-) -> f64 {
-    let mut settings = crate::common::settings(solver);
+    let mut settings = crate::common::settings(find(solver).unwrap());
     let parts = parts.map_or(1, |parts| parts * std::mem::replace(&mut settings.budget.substeps, 1));
     settings.dt /= parts as f32;
     let mut world = scene.build(settings).unwrap();
@@ -141,73 +126,13 @@ fn residual_speed_of(
         world.step().unwrap();
         after(&mut world);
         if step >= 120 * parts {
-            let b = &world.bodies;
-            let moving = (0..b.len()).filter(|&i| b.is_dynamic(i));
-            let (mut energy, mut mass) = (0.0, 0.0);
-            for i in moving {
-                let [m, inertia] = [b.inv_mass[i], b.inv_inertia[i]].map(|inverse| 1.0 / f64::from(inverse));
-                let v = [b.velocity_x[i], b.velocity_y[i], b.angular_velocity[i]].map(f64::from);
-                energy += m * (v[0] * v[0] + v[1] * v[1]) + inertia * v[2] * v[2];
-                mass += m;
-            }
-            squares += energy / mass / f64::from(60 * parts);
+            let mass: f64 =
+                world.bodies.inv_mass.iter().filter(|m| **m > 0.0).map(|m| 1.0 / f64::from(*m)).sum();
+            let [.., energy] = totals(&world);
+            squares += 2.0 * energy / mass / f64::from(60 * parts);
         }
     }
     1e3 * squares.sqrt()
-}
-
-/// Springs that see separations rounded as at a distance of 200 m from the origin.
-#[derive(Clone, Copy, Debug)]
-struct Grainy<R>(R);
-
-impl<R: NormalRule> NormalRule for Grainy<R> {
-    const FRICTION: bool = R::FRICTION;
-
-    fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2] {
-        let far = L::splat(200.0);
-        self.0.line(against_static, (separation + far) - far, mass, old)
-    }
-}
-
-/// `rapier` with these springs.
-static GRAINY: Variant = Variant { name: "grainy", make: || Schedule::boxed(grainy_step), ..rapier::SOLVER };
-
-fn grainy_step(passes: &mut Passes<'_>) {
-    let (budget, h) = (passes.budget(), passes.h());
-    let [hertz, push_speed] = [0, 1].map(|i| passes.parameter(i));
-    let omega = angular_frequencies(hertz, CONTACT_HERTZ_FRACTION, h);
-    let soft = Grainy(Frictionless(Soft::new(omega, CONTACT_DAMPING_RATIO, push_speed, h)));
-    let rigid = Grainy(Soft::without_springs(h));
-    for substep in 0..budget.substeps {
-        if substep == 0 {
-            passes.integrate_velocities();
-            passes.warm_start();
-        } else {
-            passes.integrate_and_warm_start();
-        }
-        for _ in 0..budget.velocity_iterations {
-            passes.block_sweep(Phase::Solve, soft);
-        }
-        passes.integrate_positions();
-        for _ in 0..budget.relax_iterations {
-            passes.block_sweep_normal_first(Phase::Relax, rigid);
-        }
-        passes.end_substep(substep);
-    }
-}
-
-#[test]
-#[ignore = "prints a figure of papers/peers.md"]
-fn speeds_at_rest_with_rounded_separations() {
-    let scene = crate::common::scene("many_pyramids");
-    let speed = |parts, after: fn(&mut World)| residual_speed_of(&scene, &GRAINY, parts, after);
-    let figures = [
-        speed(None, |_| ()),
-        speed(None, round_positions),
-        speed(Some(1), |_| ()),
-        speed(Some(1), round_positions),
-    ];
-    println!("separations in f32: {figures:.5?} mm/s");
 }
 
 /// Discards the low part of positions, as in engines that keep positions in one `f32`.

@@ -73,7 +73,8 @@ fn fails_under(solver: &str, change: fn(&mut Scene), ids: &[&str]) {
     let right = run(ids, &[solvers::find(solver).unwrap()], 2, lab);
     assert_eq!(failed(&right), [""; 0], "must pass unchanged");
     let cases = right.cases.clone();
-    let wrong = verify::run(cases, right.solvers.clone(), 2, |solver| lab(solver).changing(change), &|_, _, _| ());
+    let wrong =
+        verify::run(cases, right.solvers.clone(), 2, |solver| lab(solver).changing(change), &|_, _, _| ());
     let passing: Vec<_> = ids.iter().filter(|id| !failed(&wrong).contains(id)).collect();
     assert!(passing.is_empty(), "pass in wrong physics: {passing:?}");
 }
