@@ -3,7 +3,6 @@
 use glam::Vec2;
 use simpulse::engine::bodies::{BodyDef, BodyKind, ShapeDef};
 use simpulse::engine::constraints::kernels::motion::{Integrator, RotationUpdate};
-use simpulse::engine::shapes::Shape;
 use simpulse::engine::solvers::{VARIANTS, find};
 use simpulse::engine::world::{Settings, World};
 

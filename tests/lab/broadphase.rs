@@ -6,7 +6,6 @@ use simpulse::engine::bodies::{Bodies, BodyDef, BodyKind};
 use simpulse::engine::broadphase::{BroadPhase, BroadPhaseKind, FatBoxes, Proxy};
 use simpulse::engine::params::SPECULATIVE_DISTANCE;
 use simpulse::engine::shapes::{Aabb, MassProperties, Shape};
-use simpulse::engine::solvers::find;
 
 fn boxed(min: [f32; 2], size: [f32; 2], body: u32) -> Proxy {
     let min = Vec2::from(min);
@@ -362,10 +361,8 @@ fn worlds_do_not_depend_on_the_kind() {
     for name in ["pyramid:12", "circle_pile:120", "smash"] {
         let scene = crate::common::scene(name);
         let hashes = BroadPhaseKind::ALL.map(|kind| {
-            let settings = simpulse::engine::world::Settings {
-                broadphase: kind,
-                ..crate::common::settings(find("soft_step").unwrap())
-            };
+            let settings =
+                simpulse::engine::world::Settings { broadphase: kind, ..crate::common::named("soft_step") };
             crate::common::run(&scene, settings, if name == "smash" { 12 } else { 150 }).state_hash()
         });
         assert!(hashes.iter().all(|&hash| hash == hashes[0]), "{name}: {hashes:x?}");

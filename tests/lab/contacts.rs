@@ -115,7 +115,7 @@ fn a_list_that_the_caller_cut_is_found_again() {
 fn arms(kind: BodyKind, [lower, upper]: [SceneShape; 2]) -> [f32; 2] {
     let bodies = vec![SceneBody::new(kind, [0.0, 0.0], lower), SceneBody::dynamic([0.0, 0.8], upper)];
     let scene = Scene::new("pair", bodies).weightless();
-    let mut world = scene.build(crate::common::settings(find("shim").unwrap())).unwrap();
+    let mut world = scene.build(crate::common::named("shim")).unwrap();
     world.find_contacts();
     let [contact] = &world.contacts[..] else { panic!("{} contacts", world.contacts.len()) };
     let [first, ..] = contact.manifold.points;

@@ -49,7 +49,7 @@ fn row(
 ///   2 m v ε v per body, 4 ε K in total, before and after. Impulses come from three products and sums each:
 ///   4 ε (1 + µ) N V on two bodies.
 fn most_made_by_waves(bodies: Vec<SceneBody>, friction: f64) -> [f64; 2] {
-    let (mut settings, radius) = (crate::common::settings(find("pgs").unwrap()), 0.5);
+    let (mut settings, radius) = (crate::common::named("pgs"), 0.5);
     settings.impacts = Impacts::Waves;
     settings.record_impulses = true;
     settings.budget.velocity_iterations = 0;
@@ -81,10 +81,7 @@ fn most_made_by_waves(bodies: Vec<SceneBody>, friction: f64) -> [f64; 2] {
 
 /// Largest energy gain of a whole step, relative to the initial energy.
 fn most_made(bodies: Vec<SceneBody>) -> f64 {
-    let mut world = Scene::new("rough", bodies)
-        .weightless()
-        .build(crate::common::settings(find(DEFAULT).unwrap()))
-        .unwrap();
+    let mut world = Scene::new("rough", bodies).weightless().build(crate::common::named(DEFAULT)).unwrap();
     let [.., start] = totals(&world);
     let (mut before, mut most) = (start, 0.0_f64);
     for _ in 0..60 {
@@ -192,7 +189,7 @@ proptest! {
             SceneBody::dynamic([0.0, 0.0], disc()).moving([0.0, 0.0], spins[1]),
         ];
         let scene = Scene::new("discs", bodies).weightless();
-        let mut world = scene.build(crate::common::settings(find(DEFAULT).unwrap())).unwrap();
+        let mut world = scene.build(crate::common::named(DEFAULT)).unwrap();
         let before = totals(&world);
         (0..60).for_each(|_| world.step().unwrap());
         let after = totals(&world);

@@ -1,7 +1,7 @@
 //! Law: features that a scene does not use cost nothing, and dropping them changes nothing.
 
 use simpulse::engine::constraints::{Features, Impacts, Layout, OppositeKind};
-use simpulse::engine::solvers::{VARIANTS, find};
+use simpulse::engine::solvers::VARIANTS;
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 
 /// Scenes and the features that each of them uses.
@@ -36,7 +36,7 @@ fn scene(name: &str) -> Scene {
 #[test]
 fn needs_are_read_off_the_scene() {
     for (name, features) in scenes() {
-        let world = scene(name).build(crate::common::settings(find("projection").unwrap())).unwrap();
+        let world = scene(name).build(crate::common::named("projection")).unwrap();
         assert_eq!(world.features(), features, "{name}");
     }
 }

@@ -62,7 +62,7 @@ fn a_pressed_row_does_not_swing_on_its_preload() {
     let disc = |i| SceneBody::dynamic([0.5 + f64::from(i), 0.5], SceneShape::disc(0.5).friction(0.0));
     bodies.extend((0..40).map(disc));
     let scene = Scene { gravity: [-1.0, -10.0], ..Scene::new("row", bodies) };
-    let world = crate::common::run(&scene, crate::common::settings(find("shim").unwrap()), 900);
+    let world = crate::common::run(&scene, crate::common::named("shim"), 900);
     let fastest = world.bodies.velocity_x.iter().fold(0.0f32, |most, v| most.max(v.abs()));
     assert!(fastest < 1e-4, "{fastest} m/s");
 }
@@ -70,7 +70,7 @@ fn a_pressed_row_does_not_swing_on_its_preload() {
 /// Median over the bodies of a pile of 1000 discs of their root mean square speed in the tenth second (m/s).
 fn median_speed(seed: u64, without: Without) -> f64 {
     let scene = simpulse::lab::scenes::load_with_seed("circle_pile:1000", seed).unwrap().scene;
-    let settings = Settings { without, ..crate::common::settings(find("shim").unwrap()) };
+    let settings = Settings { without, ..crate::common::named("shim") };
     let mut world = crate::common::run(&scene, settings, 540);
     let mut squares = vec![0.0; world.bodies.len()];
     for _ in 0..60 {
@@ -117,7 +117,7 @@ fn lemke_and_newton_agree_on_a_stack() {
 /// Root mean square of √(2 E_kin/M) over the third second of a scene (mm/s). `after` is called after each
 /// step. With `parts`, each substep of the standard budget becomes `parts` steps of one substep.
 fn residual_speed(scene: &Scene, solver: &str, parts: Option<u32>, after: impl Fn(&mut World)) -> f64 {
-    let mut settings = crate::common::settings(find(solver).unwrap());
+    let mut settings = crate::common::named(solver);
     let parts = parts.map_or(1, |parts| parts * std::mem::replace(&mut settings.budget.substeps, 1));
     settings.dt /= parts as f32;
     let mut world = scene.build(settings).unwrap();
@@ -181,7 +181,7 @@ fn speeds_at_rest_with_positions_in_f32() {
 #[test]
 fn heavy_boxes_on_pyramids_come_to_rest() {
     let scene = crate::common::scene("high_mass_ratio_1");
-    let world = crate::common::run(&scene, crate::common::settings(find("shim").unwrap()), 1500);
+    let world = crate::common::run(&scene, crate::common::named("shim"), 1500);
     let fastest = fastest(&world);
     // The target of 1e-3 is for speeds averaged over a second and over mass. This is the fastest body of a
     // single step.
@@ -203,7 +203,7 @@ fn weight(world: &World, body: BodyHandle) -> f64 {
 /// Load on the floor of a silo with rough walls after a minute, as a fraction of the weight in it. `only_discs`: instead of
 /// boxes and some discs.
 fn load_of_a_silo(without: Without, only_discs: bool, friction: f64, variation: u32) -> f64 {
-    let mut world = World::new(Settings { without, ..crate::common::settings(find("shim").unwrap()) });
+    let mut world = World::new(Settings { without, ..crate::common::named("shim") });
     world.settings.record_impulses = true;
     let rough = |shape: ShapeDef| shape.with_friction(friction);
     let block = |x, y| rough(ShapeDef::rectangle(x, y).unwrap());
@@ -251,7 +251,7 @@ fn preload_adds_no_load_in_silos() {
 /// Normal forces on a plug after ten seconds and after a minute, in weights. It falls by `drop` (m) into a rough taper, and
 /// stays wedged.
 fn load_of_a_plug(without: Without, degrees: f32, friction: f64, drop: f64) -> [f64; 2] {
-    let mut world = World::new(Settings { without, ..crate::common::settings(find("shim").unwrap()) });
+    let mut world = World::new(Settings { without, ..crate::common::named("shim") });
     world.settings.record_impulses = true;
     let wide = |y: f32| 0.5 + degrees.to_radians().tan() * y;
     let mut add = |body: BodyDef, vertices: [[f32; 2]; 4]| {
@@ -291,7 +291,7 @@ fn preload_presses_no_plug() {
 fn most_piles_of_ragdolls_come_to_rest() {
     let moves = |humans: u32| {
         let scene = crate::common::scene(&format!("ragdolls:{humans}"));
-        let world = crate::common::run(&scene, crate::common::settings(find("shim").unwrap()), 800);
+        let world = crate::common::run(&scene, crate::common::named("shim"), 800);
         fastest(&world) > 0.01
     };
     let restless: Vec<u32> = (3..11).filter(|&humans| moves(humans)).collect();
