@@ -7,8 +7,8 @@ use crate::lab::error::Error;
 use crate::lab::overrides;
 use crate::lab::report::columns::{self, Column, SHEETS, Sheet};
 use crate::lab::scenes::tolerance::Tolerance;
-use crate::lab::scenes::{self, CATALOG, Description};
-use crate::lab::study::{DEFAULT_SOLVERS, budget, is_path, open_scene};
+use crate::lab::scenes::{self, CATALOG, Loaded};
+use crate::lab::study::{DEFAULT_SOLVERS, budget, open_scene};
 use crate::lab::units::{bodies, count, si};
 use clap::Args;
 use serde_json::{Value, json};
@@ -149,39 +149,33 @@ fn columns(args: &ListArgs) -> Result<ExitCode, Error> {
 }
 
 fn scene(name: &str, args: &ListArgs) -> Result<ExitCode, Error> {
-    let description = match args.json || is_path(name) {
-        true => {
-            let scene = open_scene(name, args.seed, None, None)?;
-            if args.json {
-                return print(&scene.scene.to_json());
-            }
-            Description::of(&scene)
-        }
-        false => scenes::describe(name, args.seed)?,
-    };
-    print(&described(&description))
+    let loaded = open_scene(name, args.seed, None, None)?;
+    match args.json {
+        true => print(&loaded.scene.to_json()),
+        false => print(&described(&loaded)),
+    }
 }
 
 /// Description of a scene, as text.
-fn described(scene: &Description) -> String {
+fn described(loaded: &Loaded) -> String {
+    let Loaded { scene, truth, demands, tolerances: own, unchecked } = loaded;
     let [gx, gy] = scene.gravity;
     let mut text = format!(
         "{}: {}, {} steps of {}, gravity ({gx}, {gy}) m/s²\n",
         scene.name,
-        bodies(scene.bodies),
+        bodies(scene.bodies.len()),
         scene.steps,
         si(scene.dt, "s")
     );
-    if let Some((quantity, expected, unit)) = scene.reference {
-        text += &format!("reference value: {quantity} = {}\n", si(expected, unit));
+    if let Some(known) = truth {
+        text += &format!("reference value: {} = {}\n", known.quantity, si(known.expected, known.unit));
     }
     text += "holds if nothing blows up and no body passes through a static or kinematic one";
-    for demand in &scene.demands {
+    for demand in demands {
         text += &format!("; {}", demand.meaning());
     }
     text += "\ntolerances of a plausible run; a tight run is within 10 % of them, an exact run within 1 %\n";
-    let own = scene.tolerances;
-    let unit = scene.reference.map_or("", |(_, _, unit)| unit);
+    let unit = truth.as_ref().map_or("", |known| known.unit);
     let lines = [
         ("penetration", Some((own.penetration, "m"))),
         ("residual", Some((own.residual, ""))),
@@ -194,7 +188,7 @@ fn described(scene: &Description) -> String {
         let fixed = if fixed { " (at every accuracy)" } else { "" };
         text += &format!("  {name:<12} {value}: {reason}{fixed}\n");
     }
-    for what in &scene.unchecked {
+    for what in unchecked {
         text += &format!("not checked: {what}\n");
     }
     text

@@ -110,7 +110,7 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
         print_json(&json(&matrix, impacts))?;
         return Ok(exit_code(&matrix));
     }
-    print(&(text(&matrix) + &note + &outcomes(&matrix) + &verdict(&matrix)), exit_code(&matrix))
+    print(&(text(&matrix) + &note + &outcomes(&matrix) + &required(&matrix)), exit_code(&matrix))
 }
 
 /// Leaves out each mechanism of the solvers that have some.
@@ -142,28 +142,6 @@ fn exit_code(matrix: &VerifyMatrix) -> ExitCode {
     match matrix.broken_promises(DEFAULT) {
         Some(broken) if !broken.is_empty() => ExitCode::FAILURE,
         _ => ExitCode::SUCCESS,
-    }
-}
-
-fn verdict(matrix: &VerifyMatrix) -> String {
-    required(matrix) + &failed_others(matrix)
-}
-
-/// The failed cases that are not required of the default solver, by name.
-fn failed_others(matrix: &VerifyMatrix) -> String {
-    let Some(place) = matrix.solvers.iter().position(|solver| solver.name == DEFAULT) else {
-        return String::new();
-    };
-    let rows = matrix.cases.iter().zip(&matrix.cells);
-    let failed =
-        rows.filter(|(case, cells)| !case.required.is_required() && cells[place].passed() == Some(false));
-    let ids: Vec<&str> = failed.map(|(case, _)| case.id).collect();
-    match ids.len() {
-        0 => String::new(),
-        count => format!(
-            "it failed {count} cases that are not required of it (--list says why): {}\n",
-            ids.join(", ")
-        ),
     }
 }
 

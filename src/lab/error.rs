@@ -115,6 +115,15 @@ impl Error {
         Error::Invalid { place: place.into(), message: message.into() }
     }
 
+    /// An invalid value at `place`, unless it is as it must be.
+    pub(in crate::lab) fn require(
+        holds: bool,
+        place: &str,
+        message: impl FnOnce() -> String,
+    ) -> Result<(), Self> {
+        if holds { Ok(()) } else { Err(Error::invalid(place, message())) }
+    }
+
     /// An unknown `name`, with the most similar of `known` as a suggestion.
     pub fn unknown<'a>(kind: &'static str, name: &str, known: impl Iterator<Item = &'a str>) -> Self {
         // For a name that is long, or long once escaped, no other names are listed.

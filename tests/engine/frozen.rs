@@ -121,9 +121,7 @@ fn topple_time(frozen: Freezing) -> f64 {
 fn corner_angle(frozen: Freezing) -> f64 {
     let (mut world, body, rate) = on_its_corner(frozen, [0.5, 0.5], 1e-3);
     let start = f64::from(world.bodies.angle(body.index()));
-    for _ in 0..72 {
-        world.step().unwrap();
-    }
+    (0..72).for_each(|_| world.step().unwrap());
     let angle = 1e-3 + start - f64::from(world.bodies.angle(body.index()));
     angle / (1e-3 * (rate * 1.2).cosh())
 }

@@ -45,9 +45,7 @@ fn same_bits_at_every_width() {
             let mut world = World::new(Settings::new(find(solver).unwrap()).exactly(width));
             let ground = world.add_body(&BodyDef::fixed([0.0, 0.0])).unwrap();
             chain(&mut world, ground, 10, 0.3);
-            for _ in 0..60 {
-                world.step().unwrap();
-            }
+            (0..60).for_each(|_| world.step().unwrap());
             world.state_hash()
         };
         for width in LaneWidth::ALL {
@@ -100,9 +98,7 @@ fn joints_keep_the_momenta_of_a_free_chain() {
         world.bodies.angular_velocity[3] = 8.0;
         world.bodies.velocity_y[5] = 3.0;
         let before = momenta(&world);
-        for _ in 0..120 {
-            world.step().unwrap();
-        }
+        (0..120).for_each(|_| world.step().unwrap());
         let after = momenta(&world);
         // Masses of 5 and 16 kg at a few m/s and 20 m: rounding of positions and speeds over 1680 substeps.
         for (k, scale) in [50.0, 50.0, 1000.0].into_iter().enumerate() {
@@ -144,9 +140,7 @@ fn a_joint_is_changed_between_steps() {
             } else {
                 world.add_joint(&hinge(other, 10.0)).unwrap()
             };
-            for _ in 0..30 {
-                world.step().unwrap();
-            }
+            (0..30).for_each(|_| world.step().unwrap());
             let gap = world.joint_state(joint).unwrap().gap;
             assert!(gap < 0.02, "{solver}: {gap} m");
             let i = other.index();
@@ -205,9 +199,7 @@ fn which_body_is_a_does_not_matter_to_a_hinge() {
         let rod = world.add_body(&BodyDef::dynamic([0.5, 0.0]).with(rod)).unwrap();
         let joint = if swap { Joint::revolute(rod, ground) } else { Joint::revolute(ground, rod) };
         world.add_joint(&joint.anchor([0.0, 0.0])).unwrap();
-        for _ in 0..120 {
-            world.step().unwrap();
-        }
+        (0..120).for_each(|_| world.step().unwrap());
         world.bodies.center(rod.index())
     };
     let (one, other) = (fall(false), fall(true));
@@ -223,9 +215,7 @@ fn joined_bodies_collide_if_they_are_told_to() {
         let disc = |x: f64| BodyDef::dynamic([x, 0.0]).with(ShapeDef::circle(0.5).unwrap());
         let [a, b] = [0.0, 0.9].map(|x| world.add_body(&disc(x)).unwrap());
         world.add_joint(&joint(a, b)).unwrap();
-        for _ in 0..60 {
-            world.step().unwrap();
-        }
+        (0..60).for_each(|_| world.step().unwrap());
         (world.contacts.len(), world.bodies.position_x[b.index()] - world.bodies.position_x[a.index()])
     };
     assert_eq!(overlap(Joint::filter).0, 0);
@@ -241,16 +231,12 @@ fn a_motor_reaches_its_speed_or_stalls_at_its_torque() {
     let inertia = 1.0 / f64::from(world.bodies.inv_inertia[wheel.index()]);
     let motor = Joint::revolute(ground, wheel).anchor([0.0; 2]).motor(3.0, 0.5 * inertia);
     let joint = world.add_joint(&motor).unwrap();
-    for _ in 0..60 {
-        world.step().unwrap();
-    }
+    (0..60).for_each(|_| world.step().unwrap());
     // 0.5 rad/s² for one second.
     let spin = f64::from(world.bodies.angular_velocity[wheel.index()]);
     assert!((spin - 0.5).abs() < 1e-4, "{spin}");
     assert!((world.joint_state(joint).unwrap().load[1] - 0.5 * inertia).abs() < 1e-3 * inertia);
-    for _ in 0..400 {
-        world.step().unwrap();
-    }
+    (0..400).for_each(|_| world.step().unwrap());
     let spin = f64::from(world.bodies.angular_velocity[wheel.index()]);
     assert!((spin - 3.0).abs() < 1e-5, "{spin}");
     // The angle is not wrapped: 9/(2·0.5) rad until the target speed is reached, then 3 rad/s.
@@ -308,9 +294,7 @@ fn a_world_with_joints_is_saved_and_goes_on_with_the_same_bits() {
     let ball = BodyDef::dynamic([31.0, 0.0]).with(ShapeDef::circle(0.5).unwrap());
     let ball = world.add_body(&ball).unwrap();
     world.add_joint(&Joint::revolute(ground, ball).anchor([30.0, 0.0])).unwrap();
-    for _ in 0..30 {
-        world.step().unwrap();
-    }
+    (0..30).for_each(|_| world.step().unwrap());
     let text = serde_json::to_string(&world).unwrap();
     let mut read: World = serde_json::from_str(&text).unwrap();
     let mut copy = world.clone();
@@ -727,9 +711,7 @@ fn a_type_of_joint_from_outside_takes_part_under_every_solver() {
         let mut gears = Joints::new((), false, 0.0);
         gears.push(Gear { ratio: -2.0 }, &world.bodies, [a.index() as u32, b.index() as u32], &[], 0.0);
         world.add_constraints(Box::new(gears));
-        for _ in 0..30 {
-            world.step().unwrap();
-        }
+        (0..30).for_each(|_| world.step().unwrap());
         let [wa, wb] = [a, b].map(|body| world.bodies.angular_velocity[body.index()]);
         // In `avbd`, multipliers keep acting after the initial jolt of the gears and take speed away.
         let least = if solver.name == "avbd" { 0.2 } else { 0.5 };

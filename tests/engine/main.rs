@@ -9,6 +9,7 @@ mod motion;
 mod narrow_batches;
 mod narrowphase;
 mod observe;
+mod random;
 mod rows;
 mod shapes;
 mod soundness;

@@ -3,25 +3,11 @@
 use glam::Vec2;
 use simpulse::engine::bodies::{BodyDef, BodyKind, ShapeDef};
 use simpulse::engine::constraints::kernels::motion::{Integrator, RotationUpdate};
-use simpulse::engine::shapes::Shape;
 use simpulse::engine::solvers::{VARIANTS, find};
 use simpulse::engine::world::{Settings, World};
 
 fn body(kind: BodyKind, position: [f64; 2]) -> BodyDef {
-    let shape = Shape::rectangle("test", Vec2::new(0.5, 0.25), Vec2::ZERO, 0.0, 0.0).unwrap();
-    BodyDef {
-        kind,
-        position,
-        angle: 0.0,
-        velocity: [0.0; 2],
-        angular_velocity: 0.0,
-        gravity_scale: 1.0,
-        linear_damping: 0.0,
-        angular_damping: 0.0,
-        group: 0,
-        bullet: false,
-        shapes: vec![ShapeDef { shape, density: 2.0, friction: 0.5, restitution: 0.0 }],
-    }
+    BodyDef::new(kind, position, vec![ShapeDef::rectangle(0.5, 0.25).unwrap().with_density(2.0)])
 }
 
 fn world(settings: Settings, body: &BodyDef) -> World {
@@ -42,9 +28,7 @@ fn free_fall_is_the_discrete_parabola() {
                 def.velocity = [1.5, 4.0];
                 let mut world = world(settings, &def);
                 let steps = 60;
-                for _ in 0..steps {
-                    world.step().unwrap();
-                }
+                (0..steps).for_each(|_| world.step().unwrap());
                 let n = (steps * substeps) as f64;
                 let t = steps as f64 / 60.0;
                 let y = 20.0 + 4.0 * t - 10.0 * t * t / 2.0 * (1.0 + sign / n);
@@ -96,9 +80,7 @@ fn the_rotation_stays_on_the_unit_circle() {
     let mut def = body(BodyKind::Dynamic, [0.0; 2]);
     def.angular_velocity = 17.0;
     let mut world = world(settings, &def);
-    for _ in 0..2000 {
-        world.step().unwrap();
-    }
+    (0..2000).for_each(|_| world.step().unwrap());
     let (c, s) = (world.bodies.rotation_cos[0] as f64, world.bodies.rotation_sin[0] as f64);
     assert!((c.hypot(s) - 1.0).abs() < 1e-6, "{c} {s}");
 }
@@ -113,9 +95,7 @@ fn damping_is_implicit() {
     def.angular_velocity = 3.0;
     (def.linear_damping, def.angular_damping) = (120.0, 6.0);
     let mut world = world(settings, &def);
-    for _ in 0..3 {
-        world.step().unwrap();
-    }
+    (0..3).for_each(|_| world.step().unwrap());
     // h c = 2 and 0.1.
     assert!((world.bodies.velocity_x[0] as f64 - 8.0 / 27.0).abs() < 1e-6);
     assert!((world.bodies.angular_velocity[0] as f64 - 3.0 / 1.1_f64.powi(3)).abs() < 1e-6);
@@ -130,9 +110,7 @@ fn forces_and_torques_accelerate() {
     // Mass 2·1·0.5 = 1 kg, inertia m (1² + 0.5²)/12.
     world.bodies.force_x[0] = 6.0;
     world.bodies.torque[0] = 1.25 / 12.0;
-    for _ in 0..60 {
-        world.step().unwrap();
-    }
+    (0..60).for_each(|_| world.step().unwrap());
     assert!((world.bodies.velocity_x[0] - 6.0).abs() < 1e-4);
     assert!((world.bodies.angular_velocity[0] - 1.0).abs() < 1e-4);
 }
@@ -150,9 +128,7 @@ fn static_bodies_stay_and_kinematic_bodies_follow_their_velocity() {
     world.add_body(&moving).unwrap();
     world.add_body(&body(BodyKind::Dynamic, [10.0, 0.45])).unwrap();
     let pose = world.bodies.pose(0);
-    for _ in 0..30 {
-        world.step().unwrap();
-    }
+    (0..30).for_each(|_| world.step().unwrap());
     assert_eq!(world.bodies.pose(0), pose);
     assert!((world.bodies.position_x[1] - 10.25).abs() < 1e-5);
     assert!((world.bodies.angle(1) - 0.25).abs() < 1e-5);

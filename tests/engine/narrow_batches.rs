@@ -1,6 +1,7 @@
 //! Law: at every width, the narrow phase in lanes finds exactly what `collide_in_step` finds pair by pair, to
 //! the bit. A contact keeps the impulses of points whose features persist.
 
+use crate::random::{capsule, circle, coordinate, point, polygon, pose, rectangle, rounding, segment, v};
 use glam::Vec2;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -13,10 +14,6 @@ use simpulse::engine::narrowphase::{Margins, collide, collide_in_step};
 use simpulse::engine::shapes::{Pose, Shape};
 
 const SPECULATIVE: f32 = 0.1;
-
-fn v(x: f32, y: f32) -> Vec2 {
-    Vec2::new(x, y)
-}
 
 /// Pairs of one kind, body and shape 2i against 2i + 1, with their contacts.
 struct Scene {
@@ -107,52 +104,14 @@ fn bits(m: &Manifold) -> Vec<u32> {
     bits
 }
 
-fn coordinate(limit: f32) -> impl Strategy<Value = f32> {
-    (-(1i32 << 20)..=1 << 20).prop_map(move |k| limit * k as f32 / (1 << 20) as f32)
-}
-
-fn point(limit: f32) -> impl Strategy<Value = Vec2> {
-    (coordinate(limit), coordinate(limit)).prop_map(|(x, y)| v(x, y))
-}
-
-fn rounding() -> impl Strategy<Value = f32> {
-    prop_oneof![Just(0.0f32), 0.01f32..0.3]
-}
-
-fn rectangle() -> impl Strategy<Value = Shape> {
-    (0.05f32..1.5, 0.05f32..1.5, point(0.5), coordinate(3.0), rounding()).prop_map(
-        |(hx, hy, center, angle, r)| Shape::rectangle("b", v(hx, hy), center, angle, r).expect("valid"),
-    )
-}
-
-fn circle() -> impl Strategy<Value = Shape> {
-    (point(0.5), 0.05f32..1.0).prop_map(|(c, r)| Shape::circle("c", c, r).expect("valid"))
-}
-
 /// Polygons of 3 to 8 vertices and capsules.
 fn hull() -> impl Strategy<Value = Shape> {
-    let angles = prop::collection::vec(0.0f32..std::f32::consts::TAU, 3..=8);
-    prop_oneof![
-        3 => (angles, 0.1f32..1.5, 0.1f32..1.5, point(0.5), rounding()).prop_filter_map(
-            "valid polygon",
-            |(mut angles, rx, ry, center, radius)| {
-                angles.sort_by(f32::total_cmp);
-                let corner = |&t: &f32| center + v(rx, ry) * Vec2::from_angle(t);
-                Shape::polygon("polygon", &angles.iter().map(corner).collect::<Vec<_>>(), radius).ok()
-            },
-        ),
-        1 => (point(1.0), point(1.0), 0.01f32..0.5)
-            .prop_filter_map("long enough", |(a, b, r)| Shape::capsule("c", a, b, r).ok()),
-    ]
+    prop_oneof![3 => polygon(), 1 => capsule()]
 }
 
 /// Any straight shape: a segment, rectangle, polygon or capsule.
 fn straight() -> impl Strategy<Value = Shape> {
-    prop_oneof![
-        1 => (point(1.5), point(1.5)).prop_filter_map("long enough", |(a, b)| Shape::segment("s", a, b).ok()),
-        1 => rectangle(),
-        2 => hull(),
-    ]
+    prop_oneof![1 => segment(), 1 => rectangle(), 2 => hull()]
 }
 
 /// Shapes for pairs of one kind: enough for a full batch and part of another, or fewer.
@@ -179,10 +138,7 @@ fn pairs() -> impl Strategy<Value = (PairKind, Vec<Shape>)> {
 }
 
 fn poses() -> impl Strategy<Value = Vec<Pose>> {
-    let angle =
-        prop_oneof![4 => coordinate(3.2), 1 => (-2..3).prop_map(|k| k as f32 * std::f32::consts::FRAC_PI_2)];
-    let pose = (point(1.5), angle).prop_map(|(position, angle)| Pose::new(position, angle));
-    prop::collection::vec(pose, 80)
+    prop::collection::vec(pose(1.5), 80)
 }
 
 proptest! {

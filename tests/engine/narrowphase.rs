@@ -1,6 +1,7 @@
 //! Narrow phase: hand-computed cases, and laws over random shapes and poses with GJK and EPA (`f64`, by
 //! support functions) as reference.
 
+use crate::random::{self, capsule, circle, coordinate, point, polygon, rounding, segment, v};
 use glam::Vec2;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -20,10 +21,6 @@ const FLUSH_PREFERENCE: f64 = 5.0e-4;
 
 /// Vertices closer than this use the face's normal (`VERTEX_TOLERANCE`).
 const VERTEX_TOLERANCE: f64 = 5.0e-5;
-
-fn v(x: f32, y: f32) -> Vec2 {
-    Vec2::new(x, y)
-}
 
 fn at(x: f32, y: f32) -> Pose {
     Pose { position: v(x, y), rotation: v(1.0, 0.0) }
@@ -209,50 +206,12 @@ fn degenerate_positions_have_the_stated_normal() {
 
 // ---------------------------------------------------------------- random shapes
 
-fn coordinate(limit: f32) -> impl Strategy<Value = f32> {
-    // Built from integers: over many cases, the sampler of symmetric float ranges fails its own assertion.
-    (-(1i32 << 20)..=1 << 20).prop_map(move |k| limit * k as f32 / (1 << 20) as f32)
-}
-
-fn point(limit: f32) -> impl Strategy<Value = Vec2> {
-    (coordinate(limit), coordinate(limit)).prop_map(|(x, y)| v(x, y))
-}
-
-fn rounding() -> impl Strategy<Value = f32> {
-    prop_oneof![Just(0.0f32), 0.01f32..0.5]
-}
-
-/// Convex by construction: points of an ellipse in angular order.
-fn polygon() -> impl Strategy<Value = Shape> {
-    let angles = prop::collection::vec(0.0f32..std::f32::consts::TAU, 3..=8);
-    (angles, 0.1f32..1.5, 0.1f32..1.5, point(0.5), rounding()).prop_filter_map(
-        "valid polygon",
-        |(mut angles, rx, ry, center, radius)| {
-            angles.sort_by(f32::total_cmp);
-            let vertices: Vec<Vec2> =
-                angles.iter().map(|&t| center + v(rx, ry) * Vec2::from_angle(t)).collect();
-            Shape::polygon("polygon", &vertices, radius).ok()
-        },
-    )
-}
-
 fn shape() -> impl Strategy<Value = Shape> {
-    prop_oneof![
-        2 => polygon(),
-        2 => (0.05f32..1.5, 0.05f32..1.5, point(0.5), coordinate(3.0), rounding()).prop_map(
-            |(hx, hy, center, angle, r)| Shape::rectangle("b", v(hx, hy), center, angle, r).expect("valid")),
-        1 => (point(1.0), point(1.0), 0.01f32..0.5).prop_filter_map(
-            "long enough", |(a, b, r)| Shape::capsule("c", a, b, r).ok()),
-        1 => (point(0.5), 0.05f32..1.0).prop_map(|(c, r)| Shape::circle("c", c, r).expect("valid")),
-        1 => (point(1.5), point(1.5)).prop_filter_map("long enough", |(a, b)| Shape::segment("s", a, b).ok()),
-    ]
+    prop_oneof![2 => polygon(), 2 => random::rectangle(), 1 => capsule(), 1 => circle(), 1 => segment()]
 }
 
 fn pose() -> impl Strategy<Value = Pose> {
-    // Multiples of a quarter turn make flush faces common.
-    let angle =
-        prop_oneof![4 => coordinate(3.2), 1 => (-2..3).prop_map(|k| k as f32 * std::f32::consts::FRAC_PI_2)];
-    (point(2.0), angle).prop_map(|(position, angle)| Pose::new(position, angle))
+    random::pose(2.0)
 }
 
 fn both_segments(a: &Shape, b: &Shape) -> bool {

@@ -165,9 +165,7 @@ fn chain(solver: &'static Variant, width: LaneWidth, order: Order) -> (World, Se
 }
 
 fn run(world: &mut World, steps: usize) {
-    for _ in 0..steps {
-        world.step().unwrap();
-    }
+    (0..steps).for_each(|_| world.step().unwrap());
 }
 
 #[test]

@@ -108,14 +108,10 @@ fn what_stood_on_a_removed_body_falls() {
         ground(&mut world);
         let low = world.add_body(&unit_box([0.0, 0.5])).unwrap();
         let high = world.add_body(&unit_box([0.0, 1.5])).unwrap();
-        for _ in 0..30 {
-            world.step().unwrap();
-        }
+        (0..30).for_each(|_| world.step().unwrap());
         world.remove_body(low).unwrap();
         let start = world.bodies.origin(high.index())[1];
-        for _ in 0..12 {
-            world.step().unwrap();
-        }
+        (0..12).for_each(|_| world.step().unwrap());
         let fallen = start - world.bodies.origin(high.index())[1];
         // g t²/2 is 0.2 m; semi-implicit steps add a factor of 1 + 1/12. A solver may leave one step of
         // gravity in the velocity of a resting body (0.167 m/s · 0.2 s).
@@ -205,9 +201,7 @@ fn a_force_lasts_for_a_step_and_a_standing_force_until_it_is_changed() {
     world.apply_force(a, [20.0 * mass, 0.0]).unwrap();
     world.apply_force(a, [10.0 * mass, 0.0]).unwrap();
     world.apply_torque(b, 1.0).unwrap();
-    for _ in 0..3 {
-        world.step().unwrap();
-    }
+    (0..3).for_each(|_| world.step().unwrap());
     // 30 m/s² for one step of 1/60 s, and for three steps.
     assert!((world.bodies.velocity_x[0] - 0.5).abs() < 1e-5, "{}", world.bodies.velocity_x[0]);
     assert!((world.bodies.velocity_x[1] - 1.5).abs() < 1e-5, "{}", world.bodies.velocity_x[1]);
@@ -234,13 +228,9 @@ fn a_moved_ground_is_found_where_it_is() {
     let mut world = world("soft_step");
     let floor = ground(&mut world);
     let body = world.add_body(&unit_box([0.0, 0.5])).unwrap();
-    for _ in 0..10 {
-        world.step().unwrap();
-    }
+    (0..10).for_each(|_| world.step().unwrap());
     world.set_pose(floor, [0.0, -3.0], 0.0).unwrap();
-    for _ in 0..120 {
-        world.step().unwrap();
-    }
+    (0..120).for_each(|_| world.step().unwrap());
     let [_, y] = world.bodies.origin(body.index());
     assert!((y + 1.5).abs() < 0.01, "{y}");
     assert_eq!(
@@ -394,9 +384,7 @@ fn builds_agree_if_all_or_none_of_them_fuse() {
             };
             world.add_body(&BodyDef::dynamic(place).with(shape.unwrap()).with_angle(0.1 * i as f64)).unwrap();
         }
-        for _ in 0..60 {
-            world.step().unwrap();
-        }
+        (0..60).for_each(|_| world.step().unwrap());
         world.state_hash()
     };
     let found = HASHES.map(|(name, _)| (name, hash(name)));

@@ -6,7 +6,6 @@ use simpulse::engine::bodies::{Bodies, BodyDef, BodyKind};
 use simpulse::engine::broadphase::{BroadPhase, BroadPhaseKind, FatBoxes, Proxy};
 use simpulse::engine::params::SPECULATIVE_DISTANCE;
 use simpulse::engine::shapes::{Aabb, MassProperties, Shape};
-use simpulse::engine::solvers::find;
 
 fn boxed(min: [f32; 2], size: [f32; 2], body: u32) -> Proxy {
     let min = Vec2::from(min);
@@ -299,7 +298,8 @@ proptest! {
         let (mut shapes, mut shape_body) = (Vec::new(), Vec::new());
         for i in 0..12 {
             let kind = [BodyKind::Dynamic, BodyKind::Dynamic, BodyKind::Kinematic][i % 3];
-            bodies.push(&body_def(kind, [f64::from(far) + i as f64, 0.0]), &MassProperties::ZERO);
+            let def = BodyDef::new(kind, [f64::from(far) + i as f64, 0.0], Vec::new()).with_angle(0.3);
+            bodies.push(&def, &MassProperties::ZERO);
             for shape in &assortment()[i % 4..=i % 4 + i % 2] {
                 shapes.push(*shape);
                 shape_body.push(i as u32);
@@ -343,22 +343,6 @@ fn rounding(aabb: &Aabb) -> f32 {
     4.0 * f32::EPSILON * aabb.min.abs().max(aabb.max.abs()).max_element()
 }
 
-fn body_def(kind: BodyKind, position: [f64; 2]) -> BodyDef {
-    BodyDef {
-        kind,
-        position,
-        angle: 0.3,
-        velocity: [0.0; 2],
-        angular_velocity: 0.0,
-        gravity_scale: 1.0,
-        linear_damping: 0.0,
-        angular_damping: 0.0,
-        group: 0,
-        bullet: false,
-        shapes: Vec::new(),
-    }
-}
-
 /// One of each shape, off center.
 fn assortment() -> [Shape; 5] {
     let (a, b) = (Vec2::new(-0.5, 0.2), Vec2::new(2.0, 0.3));
@@ -377,10 +361,8 @@ fn worlds_do_not_depend_on_the_kind() {
     for name in ["pyramid:12", "circle_pile:120", "smash"] {
         let scene = crate::common::scene(name);
         let hashes = BroadPhaseKind::ALL.map(|kind| {
-            let settings = simpulse::engine::world::Settings {
-                broadphase: kind,
-                ..crate::common::settings(find("soft_step").unwrap())
-            };
+            let settings =
+                simpulse::engine::world::Settings { broadphase: kind, ..crate::common::named("soft_step") };
             crate::common::run(&scene, settings, if name == "smash" { 12 } else { 150 }).state_hash()
         });
         assert!(hashes.iter().all(|&hash| hash == hashes[0]), "{name}: {hashes:x?}");

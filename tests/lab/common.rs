@@ -3,13 +3,24 @@
 
 use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::lanes::LaneWidth;
-use simpulse::engine::solvers::Variant;
+use simpulse::engine::solvers::{Variant, find};
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes::{self, Scene, SceneBody, SceneShape};
 
 /// Standard settings of a solver.
 pub fn settings(variant: &'static Variant) -> Settings {
     Settings::new(variant)
+}
+
+/// Standard settings of the solver with this name.
+pub fn named(solver: &str) -> Settings {
+    settings(find(solver).unwrap())
+}
+
+/// These bodies on the ground.
+pub fn on_ground(bodies: Vec<SceneBody>) -> Scene {
+    let ground = SceneBody::fixed([0.0, -1.0], SceneShape::rectangle(60.0, 1.0));
+    Scene::new("on ground", std::iter::once(ground).chain(bodies).collect())
 }
 
 /// Standard settings of a solver at one width.

@@ -1,5 +1,6 @@
 //! Law: contacts kept and updated in place equal contacts found from scratch.
 
+use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::broadphase::Proxy;
 use simpulse::engine::contacts::Contact;
 use simpulse::engine::lanes::LaneWidth;
@@ -7,7 +8,7 @@ use simpulse::engine::narrowphase::{Margins, collide_in_step};
 use simpulse::engine::params::SPECULATIVE_DISTANCE;
 use simpulse::engine::solvers::find;
 use simpulse::engine::world::World;
-use simpulse::lab::scenes::Scene;
+use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 
 /// The contacts of the coming step from scratch: every pair of shapes is collided on its own. Points take the
 /// impulses of `last` by feature.
@@ -111,15 +112,10 @@ fn a_list_that_the_caller_cut_is_found_again() {
 }
 
 /// Arms (m) of the single contact between a body of `kind` and a dynamic body that overlap by 0.2 m.
-fn arms(kind: &str, shapes: [&str; 2]) -> [f32; 2] {
-    let text = format!(
-        r#"{{"name":"pair","gravity":[0,0],"bodies":[
-            {{"type":"{kind}","position":[0,0],"shapes":[{{{}}}]}},
-            {{"type":"dynamic","position":[0,0.8],"shapes":[{{{}}}]}}]}}"#,
-        shapes[0], shapes[1]
-    );
-    let scene = Scene::from_json(&text, "pair.json".as_ref()).unwrap();
-    let mut world = scene.build(crate::common::settings(find("shim").unwrap())).unwrap();
+fn arms(kind: BodyKind, [lower, upper]: [SceneShape; 2]) -> [f32; 2] {
+    let bodies = vec![SceneBody::new(kind, [0.0, 0.0], lower), SceneBody::dynamic([0.0, 0.8], upper)];
+    let scene = Scene::new("pair", bodies).weightless();
+    let mut world = scene.build(crate::common::named("shim")).unwrap();
     world.find_contacts();
     let [contact] = &world.contacts[..] else { panic!("{} contacts", world.contacts.len()) };
     let [first, ..] = contact.manifold.points;
@@ -129,12 +125,16 @@ fn arms(kind: &str, shapes: [&str; 2]) -> [f32; 2] {
 
 #[test]
 fn arms_meet_midway_between_moving_bodies_and_at_the_surface_of_one_on_a_held_body() {
-    let (disc, square) = (r#""circle":{"radius":0.5}"#, r#""box":{"half":[0.5,0.5]}"#);
-    for shapes in [[disc, disc], [square, disc], [disc, square], [square, square]] {
-        for (kind, truth) in [("dynamic", [0.4, -0.4]), ("static", [0.3, -0.5]), ("kinematic", [0.3, -0.5])] {
-            let found = arms(kind, shapes);
+    let (disc, square) = (|| SceneShape::disc(0.5), || SceneShape::rectangle(0.5, 0.5));
+    for shapes in [[disc(), disc()], [square(), disc()], [disc(), square()], [square(), square()]] {
+        for (kind, truth) in [
+            (BodyKind::Dynamic, [0.4, -0.4]),
+            (BodyKind::Static, [0.3, -0.5]),
+            (BodyKind::Kinematic, [0.3, -0.5]),
+        ] {
+            let found = arms(kind, shapes.clone());
             let near = found.iter().zip(truth).all(|(found, truth)| (found - truth).abs() < 1e-6);
-            assert!(near, "{kind} {shapes:?}: {found:?}");
+            assert!(near, "{kind:?} {shapes:?}: {found:?}");
         }
     }
 }

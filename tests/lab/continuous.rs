@@ -1,7 +1,7 @@
 //! Continuous collision: fast bodies do not pass through, slow bodies are unaffected, and lanes do not
 //! matter.
 
-use crate::common::{run, settings, with_width};
+use crate::common::{named, run, settings, with_width};
 use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::{VARIANTS, Variant, find};
@@ -129,7 +129,7 @@ fn fast_bodies_stay_in_their_rooms() {
     assert_eq!(escapes(&on(soft_step)), 0);
     // Otherwise the scenes would be too easy.
     assert!(escapes(&settings(soft_step)) > 20);
-    assert_eq!(escapes(&settings(find("shim").unwrap())), 0);
+    assert_eq!(escapes(&named("shim")), 0);
 }
 
 /// A box between a wall 2 m thick and a door that moves toward it at 1 m/s and on into the wall.
@@ -167,7 +167,7 @@ fn what_stands_on_its_tip_tips_over() {
 
 #[test]
 fn where_pistons_leave_no_room_nothing_is_flung_and_nothing_leaves() {
-    let shim = settings(find("shim").unwrap());
+    let shim = named("shim");
     assert!(shim.continuous);
     for number in 0..60 {
         let outcome = run_solver(&family("driven").unwrap().case(1, number), &shim).unwrap();
@@ -182,7 +182,7 @@ fn where_pistons_leave_no_room_nothing_is_flung_and_nothing_leaves() {
 /// over-relaxation that friction does not bound, the third leaves at 200 m/s.
 #[test]
 fn what_is_crushed_is_not_flung() {
-    let shim = settings(find("shim").unwrap());
+    let shim = named("shim");
     for (name, seed, number) in [("ratios", 20, 54), ("scales", 1, 601), ("hung", 3, 1420)] {
         let outcome = run_solver(&family(name).unwrap().case(seed, number), &shim).unwrap();
         let fails = [TortureVerdict::Diverged, TortureVerdict::Energy, TortureVerdict::Flung]

@@ -49,7 +49,7 @@ fn row(
 ///   2 m v ε v per body, 4 ε K in total, before and after. Impulses come from three products and sums each:
 ///   4 ε (1 + µ) N V on two bodies.
 fn most_made_by_waves(bodies: Vec<SceneBody>, friction: f64) -> [f64; 2] {
-    let (mut settings, radius) = (crate::common::settings(find("pgs").unwrap()), 0.5);
+    let (mut settings, radius) = (crate::common::named("pgs"), 0.5);
     settings.impacts = Impacts::Waves;
     settings.record_impulses = true;
     settings.budget.velocity_iterations = 0;
@@ -81,10 +81,7 @@ fn most_made_by_waves(bodies: Vec<SceneBody>, friction: f64) -> [f64; 2] {
 
 /// Largest energy gain of a whole step, relative to the initial energy.
 fn most_made(bodies: Vec<SceneBody>) -> f64 {
-    let mut world = Scene::new("rough", bodies)
-        .weightless()
-        .build(crate::common::settings(find(DEFAULT).unwrap()))
-        .unwrap();
+    let mut world = Scene::new("rough", bodies).weightless().build(crate::common::named(DEFAULT)).unwrap();
     let [.., start] = totals(&world);
     let (mut before, mut most) = (start, 0.0_f64);
     for _ in 0..60 {
@@ -147,9 +144,7 @@ fn gases_of_smooth_elastic_boxes_keep_their_energy() {
             let settings = Settings { without, ..crate::common::settings(shim) };
             let mut world = gas(125 * seed).build(settings).unwrap();
             let [.., before] = totals(&world);
-            for _ in 0..1200 {
-                world.step().unwrap();
-            }
+            (0..1200).for_each(|_| world.step().unwrap());
             let [.., after] = totals(&world);
             (after / before - 1.0).powi(2)
         };
@@ -166,9 +161,7 @@ fn gases_of_smooth_elastic_boxes_keep_their_energy() {
 fn its_bits_are_the_same_at_every_width() {
     let run = |width: LaneWidth| {
         let mut world = gas(0).build(crate::common::with_width(find(DEFAULT).unwrap(), width)).unwrap();
-        for _ in 0..300 {
-            world.step().unwrap();
-        }
+        (0..300).for_each(|_| world.step().unwrap());
         (0..world.bodies.len()).map(|i| world.bodies.center(i).map(f64::to_bits)).collect::<Vec<_>>()
     };
     let all = [LaneWidth::W1, LaneWidth::W4, LaneWidth::W8, LaneWidth::W16].map(run);
@@ -196,11 +189,9 @@ proptest! {
             SceneBody::dynamic([0.0, 0.0], disc()).moving([0.0, 0.0], spins[1]),
         ];
         let scene = Scene::new("discs", bodies).weightless();
-        let mut world = scene.build(crate::common::settings(find(DEFAULT).unwrap())).unwrap();
+        let mut world = scene.build(crate::common::named(DEFAULT)).unwrap();
         let before = totals(&world);
-        for _ in 0..60 {
-            world.step().unwrap();
-        }
+        (0..60).for_each(|_| world.step().unwrap());
         let after = totals(&world);
         for k in 0..3 {
             prop_assert!((after[k] - before[k]).abs() < 2e-5 * speed, "{before:?}, then {after:?}");

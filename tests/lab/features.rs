@@ -1,7 +1,8 @@
 //! Law: features that a scene does not use cost nothing, and dropping them changes nothing.
 
 use simpulse::engine::constraints::{Features, Impacts, Layout, OppositeKind};
-use simpulse::engine::solvers::{VARIANTS, find};
+use simpulse::engine::solvers::VARIANTS;
+use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 
 /// Scenes and the features that each of them uses.
 fn scenes() -> [(&'static str, Features); 5] {
@@ -15,33 +16,27 @@ fn scenes() -> [(&'static str, Features); 5] {
     ]
 }
 
-fn scene(name: &str) -> simpulse::lab::scenes::Scene {
+fn scene(name: &str) -> Scene {
     let shape = match name {
-        "frictionless_discs" | "disc_pile" => r#""circle":{"radius":0.37}"#,
-        "bouncing_discs" => r#""circle":{"radius":0.37},"restitution":0.7"#,
-        "sliding_boxes" => r#""box":{"half":[0.4,0.3]}"#,
+        "frictionless_discs" | "disc_pile" => SceneShape::disc(0.37),
+        "bouncing_discs" => SceneShape::disc(0.37).restitution(0.7),
+        "sliding_boxes" => SceneShape::rectangle(0.4, 0.3),
         _ => return crate::common::scene(name),
     };
-    let friction = if name == "disc_pile" { 0.6 } else { 0.0 };
-    let wall = |x: f64, y: f64, hx: f64, hy: f64| {
-        format!(r#"{{"type":"static","position":[{x},{y}],"shapes":[{{"box":{{"half":[{hx},{hy}]}}}}]}},"#)
-    };
-    let mut bodies = wall(0.0, -1.0, 6.0, 1.0) + &wall(-6.0, 5.0, 1.0, 7.0) + &wall(6.0, 5.0, 1.0, 7.0);
-    for i in 0..40 {
-        let (x, y) = ((i % 8) as f64 * 1.1 - 3.9 + 0.013 * i as f64, (i / 8) as f64 * 1.05 + 0.5);
-        bodies += &format!(
-            r#"{{"type":"dynamic","position":[{x},{y}],"shapes":[{{{shape},"friction":{friction}}}]}},"#
-        );
-    }
-    let bodies = bodies.trim_end_matches(',');
-    let text = format!(r#"{{"name":"{name}","bodies":[{bodies}]}}"#);
-    simpulse::lab::scenes::Scene::from_json(&text, "test.json".as_ref()).unwrap()
+    let shape = shape.friction(if name == "disc_pile" { 0.6 } else { 0.0 });
+    let wall = |x, y, hx, hy| SceneBody::fixed([x, y], SceneShape::rectangle(hx, hy));
+    let mut bodies = vec![wall(0.0, -1.0, 6.0, 1.0), wall(-6.0, 5.0, 1.0, 7.0), wall(6.0, 5.0, 1.0, 7.0)];
+    bodies.extend((0..40).map(|i| {
+        let at = [(i % 8) as f64 * 1.1 - 3.9 + 0.013 * i as f64, (i / 8) as f64 * 1.05 + 0.5];
+        SceneBody::dynamic(at, shape.clone())
+    }));
+    Scene::new(name, bodies)
 }
 
 #[test]
 fn needs_are_read_off_the_scene() {
     for (name, features) in scenes() {
-        let world = scene(name).build(crate::common::settings(find("projection").unwrap())).unwrap();
+        let world = scene(name).build(crate::common::named("projection")).unwrap();
         assert_eq!(world.features(), features, "{name}");
     }
 }

@@ -147,56 +147,27 @@ fn stays(p: [f64; 2], _: f64) -> [f64; 2] {
     p
 }
 
-fn same(_: usize, i: usize) -> usize {
-    i
+impl Symmetry {
+    const fn new(
+        name: &'static str,
+        image: fn(&Scene, f64) -> Scene,
+        back: fn([f64; 2], f64) -> [f64; 2],
+        amount: fn(f64) -> f64,
+    ) -> Self {
+        Symmetry { name, image, back, amount, place: |_, i| i }
+    }
 }
 
 const SYMMETRIES: [Symmetry; 9] = [
-    Symmetry {
-        name: "turned",
-        image: turned,
-        back: |p, a| turn(p, -a),
-        amount: |u| 2.0 * PI * u,
-        place: same,
-    },
-    Symmetry { name: "mirrored", image: mirrored, back: |[x, y], _| [-x, y], amount: |u| u, place: same },
-    Symmetry {
-        name: "moved",
-        image: moved,
-        back: |[x, y], by| [x - by, y + by],
-        amount: |u| if u < 0.5 { 1e3 } else { -1e3 },
-        place: same,
-    },
-    Symmetry {
-        name: "scaled",
-        image: scaled,
-        back: |[x, y], k| [x / k, y / k],
-        amount: |u| 10f64.powf(4.0 * u - 2.0),
-        place: same,
-    },
-    Symmetry {
-        name: "heavier",
-        image: heavier,
-        back: stays,
-        amount: |u| 10f64.powf(6.0 * u - 3.0),
-        place: same,
-    },
-    Symmetry {
-        name: "stepped",
-        image: stepped,
-        back: stays,
-        amount: |u| 10f64.powf(2.0 * u - 1.0),
-        place: same,
-    },
-    Symmetry {
-        name: "in_company",
-        image: in_company,
-        back: stays,
-        amount: |u| 300.0 + 100.0 * u,
-        place: same,
-    },
-    Symmetry { name: "thrice", image: thrice, back: stays, amount: |u| 100.0 + 100.0 * u, place: same },
-    Symmetry { name: "reordered", image: reordered, back: stays, amount: |u| u, place: |n, i| n - 1 - i },
+    Symmetry::new("turned", turned, |p, a| turn(p, -a), |u| 2.0 * PI * u),
+    Symmetry::new("mirrored", mirrored, |[x, y], _| [-x, y], |u| u),
+    Symmetry::new("moved", moved, |[x, y], by| [x - by, y + by], |u| if u < 0.5 { 1e3 } else { -1e3 }),
+    Symmetry::new("scaled", scaled, |[x, y], k| [x / k, y / k], |u| 10f64.powf(4.0 * u - 2.0)),
+    Symmetry::new("heavier", heavier, stays, |u| 10f64.powf(6.0 * u - 3.0)),
+    Symmetry::new("stepped", stepped, stays, |u| 10f64.powf(2.0 * u - 1.0)),
+    Symmetry::new("in_company", in_company, stays, |u| 300.0 + 100.0 * u),
+    Symmetry::new("thrice", thrice, stays, |u| 100.0 + 100.0 * u),
+    Symmetry { place: |n, i| n - 1 - i, ..Symmetry::new("reordered", reordered, stays, |u| u) },
 ];
 
 /// Times multiplied by `factor`, lengths unchanged: velocities are divided by `factor`, gravity by its
@@ -251,17 +222,6 @@ fn parted(symmetry: &Symmetry, variant: &'static Variant, scenes: u32) -> u32 {
         deviation(symmetry, variant, &scene(n), u) > TOLERANCE
     };
     (0..scenes).filter(apart).count() as u32
-}
-
-/// Counts by symmetry and solver. A sample of [`SCENES`] is too small for what occurs once in a hundred scenes.
-#[test]
-#[ignore = "half a minute; prints a table and checks nothing"]
-fn symmetries_of_720_scenes() {
-    for name in ["shim", "soft_step", "box2d", "rapier"] {
-        let variant = simpulse::engine::solvers::find(name).unwrap();
-        let counts = SYMMETRIES.iter().map(|s| format!(" {}={}", s.name, parted(s, variant, 720)));
-        println!("{name}:{}", counts.collect::<String>());
-    }
 }
 
 /// A power of two causes no rounding. So a scaled scene moves to the same bits if its length unit is scaled

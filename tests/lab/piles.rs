@@ -1,7 +1,6 @@
 //! Piles under the default solver: loads of contacts from statics, and the shortening of springs.
 
 use super::common;
-use simpulse::engine::solvers;
 use simpulse::engine::world::World;
 use simpulse::lab::metrics::Observation;
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
@@ -9,18 +8,12 @@ use simpulse::lab::torture::families::FAMILIES;
 use simpulse::lab::torture::{family, run_solver};
 
 fn scene(name: &str) -> World {
-    common::scene(name).build(common::settings(solvers::find("shim").unwrap())).unwrap()
-}
-
-/// These bodies on the ground.
-fn on_ground(bodies: Vec<SceneBody>) -> Scene {
-    let ground = SceneBody::fixed([0.0, -1.0], SceneShape::rectangle(60.0, 1.0));
-    Scene::new("piles", std::iter::once(ground).chain(bodies).collect())
+    common::scene(name).build(common::named("shim")).unwrap()
 }
 
 /// The scene after these steps.
 fn stepped(scene: &Scene, steps: u32) -> World {
-    common::run(scene, common::settings(solvers::find("shim").unwrap()), steps)
+    common::run(scene, common::named("shim"), steps)
 }
 
 /// Ten tables on top of each other, each on two legs, come to rest within ten seconds.
@@ -32,7 +25,7 @@ fn tables_on_tables_rest() {
         let leg = |x| part(x, y + 0.5, [0.2, 0.5]);
         [leg(-1.5), leg(1.5), part(0.0, y + 1.25, [2.0, 0.25])]
     };
-    let fastest = common::fastest(&stepped(&on_ground((0..10).flat_map(table).collect()), 600));
+    let fastest = common::fastest(&stepped(&common::on_ground((0..10).flat_map(table).collect()), 600));
     assert!(fastest < 1e-3, "{fastest}");
 }
 
@@ -89,22 +82,6 @@ fn statics_leaves_a_stack_where_it_is() {
     }
 }
 
-/// An arch stands by thrust. If it starts with that thrust, its crown sinks by 2 mm; under loads that ignore
-/// thrust, by 12.
-#[test]
-#[ignore = "known not to hold: thrust is found by sweeps, and stones settle by 6 mm in the first steps"]
-fn an_arch_begins_with_its_thrust() {
-    let mut world = scene("arch");
-    let before = world.bodies.clone();
-    for _ in 0..300 {
-        world.step().unwrap();
-        for body in 0..world.bodies.len() {
-            let moved = (world.bodies.pose(body).position - before.pose(body).position).length();
-            assert!(moved < 4e-3, "body {body} {moved} m after {} steps", world.step_index);
-        }
-    }
-}
-
 /// Unit boxes under a box of many times their mass, for a minute: 20 µm of sinking per contact.
 #[test]
 fn columns_bear_boxes_of_a_hundred_and_nine_hundred_times_the_mass() {
@@ -113,7 +90,7 @@ fn columns_bear_boxes_of_a_hundred_and_nine_hundred_times_the_mass() {
             let shape = SceneShape::rectangle(0.5, 0.5).density(if i == count { density } else { 1.0 });
             SceneBody::dynamic([0.0, 0.5 + f64::from(i)], shape)
         };
-        let world = stepped(&on_ground((0..=count).map(boxed).collect()), 3600);
+        let world = stepped(&common::on_ground((0..=count).map(boxed).collect()), 3600);
         let heavy = world.bodies.len() - 1;
         let sunk = 0.5 + f64::from(count) - f64::from(world.bodies.position_y[heavy]);
         println!(
@@ -151,9 +128,7 @@ fn a_house_of_cards_that_begins_in_itself_stands_at_most_steps() {
         let mut world = scene("card_house");
         world.settings.dt = 1.0 / rate as f32;
         let heights = world.bodies.position_y.clone();
-        for _ in 0..4 * rate {
-            world.step().unwrap();
-        }
+        (0..4 * rate).for_each(|_| world.step().unwrap());
         world.bodies.position_y.iter().zip(heights.iter()).any(|(now, then)| (now - then).abs() >= 0.05)
     };
     let fallen: Vec<u32> = (30..500).step_by(10).filter(|&rate| falls(rate)).collect();
@@ -171,9 +146,7 @@ fn pyramids_stand_under_heavy_boxes_that_are_dropped_on_them() {
         for body in (0..heights.len()).filter(|&body| heights[body] > 20.0) {
             world.bodies.position_x[body] += 0.004 * aside as f32;
         }
-        for _ in 0..600 {
-            world.step().unwrap();
-        }
+        (0..600).for_each(|_| world.step().unwrap());
         for (body, (now, then)) in world.bodies.position_y.iter().zip(heights.iter()).enumerate() {
             let falls = if *then > 20.0 { 2.0 } else { 0.0 };
             assert!((now - then + falls).abs() < 0.2, "{aside}: body {body} is at {now}, and was at {then}");
@@ -188,7 +161,7 @@ fn pyramids_stand_under_heavy_boxes_that_are_dropped_on_them() {
 fn a_random_scene_moves_as_it_does_alone_beside_another() {
     const SCENES: u32 = 30;
     const STEPS: u32 = 150;
-    let settings = || common::settings(solvers::find("shim").unwrap());
+    let settings = || common::named("shim");
     let families: Vec<_> = FAMILIES.iter().filter(|family| family.name != "extremes").collect();
     let state = |world: &World, body: usize| {
         let b = &world.bodies;
@@ -231,8 +204,7 @@ fn impacts_of_a_step_stay_within_their_bound() {
     let (mut most, mut cut) = (0, 0);
     for family in FAMILIES {
         for number in 0..10 {
-            let mut world =
-                family.case(9, number).scene.build(common::settings(solvers::find("shim").unwrap())).unwrap();
+            let mut world = family.case(9, number).scene.build(common::named("shim")).unwrap();
             let dynamic = (0..world.bodies.len()).filter(|&body| world.bodies.is_dynamic(body)).count();
             for _ in 0..60 {
                 if world.step().is_err() {
@@ -255,7 +227,7 @@ fn impacts_of_a_step_stay_within_their_bound() {
 #[test]
 fn walls_that_are_hit_make_no_energy() {
     let struck = family("struck").unwrap();
-    let settings = common::settings(solvers::find("shim").unwrap());
+    let settings = common::named("shim");
     for number in 0..60 {
         let outcome = run_solver(&struck.case(1, number), &settings).unwrap();
         assert!(outcome.energy < 1.1, "struck {number} makes {} of the energy", outcome.energy);
@@ -271,7 +243,7 @@ fn a_little_restitution_is_none() {
             let shape = SceneShape::rectangle(0.5, 0.5).restitution(e);
             SceneBody::dynamic([0.02 * f64::from(i % 3), 0.6 + 1.2 * f64::from(i)], shape)
         };
-        stepped(&on_ground((0..10).map(boxed).collect()), 180).state_hash()
+        stepped(&common::on_ground((0..10).map(boxed).collect()), 180).state_hash()
     };
     assert_eq!(fallen(0.0), fallen(1e-6));
 }

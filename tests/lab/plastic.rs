@@ -39,11 +39,9 @@ proptest! {
         density in 0.2f64..5.0,
     ) {
         let scene = pair(angles, offset, speed, spins, friction, density);
-        let mut world = scene.build(crate::common::settings(find(DEFAULT).unwrap())).unwrap();
+        let mut world = scene.build(crate::common::named(DEFAULT)).unwrap();
         let before = totals(&world);
-        for _ in 0..60 {
-            world.step().unwrap();
-        }
+        (0..60).for_each(|_| world.step().unwrap());
         let after = totals(&world);
         let scale = before[0].hypot(before[1]).max(1.0);
         for k in 0..2 {
@@ -90,7 +88,7 @@ fn a_body_that_lands_lies_on_the_ground_and_not_where_the_step_found_it() {
         let ground = SceneBody::fixed([0.0, 0.0], SceneShape::line(5.0));
         let falling = SceneBody::dynamic([0.0, 0.5 + height], SceneShape::disc(0.5)).moving([0.0, -4.0], 0.0);
         let scene = Scene::new("landing", vec![ground, falling]).weightless();
-        let world = crate::common::run(&scene, crate::common::settings(find(DEFAULT).unwrap()), 3);
+        let world = crate::common::run(&scene, crate::common::named(DEFAULT), 3);
         let [_, y] = world.bodies.center(1);
         assert!((y - 0.5).abs() < 1e-6 && world.bodies.velocity_y[1].abs() < 1e-6, "{height}: {y}");
     }
@@ -127,8 +125,7 @@ fn a_body_that_is_caught_in_a_line_makes_no_energy_where_the_line_ends() {
     };
     let run = |substeps: u32, without: Without| {
         // Otherwise it would not get into the line.
-        let mut settings =
-            Settings { without, continuous: false, ..crate::common::settings(find(DEFAULT).unwrap()) };
+        let mut settings = Settings { without, continuous: false, ..crate::common::named(DEFAULT) };
         settings.budget.substeps = substeps;
         let mut world = scene.build(settings).unwrap();
         let (before, mut most, mut was_caught) = (energy(&world), 0.0, false);

@@ -1,15 +1,9 @@
 //! The law of rest: piles of a few boxes stay in place at the standard budget.
 
-use crate::common::fastest;
+use crate::common::{fastest, totals};
 use simpulse::engine::bodies::{BodyDef, BodyHandle, ShapeDef};
-use simpulse::engine::clock::Phase;
-use simpulse::engine::constraints::kernels::velocity::rules::{
-    Frictionless, NormalRule, Soft, angular_frequencies,
-};
-use simpulse::engine::constraints::{Passes, Schedule};
-use simpulse::engine::lanes::Lanes;
-use simpulse::engine::params::{CONTACT_DAMPING_RATIO, CONTACT_HERTZ_FRACTION, Without};
-use simpulse::engine::solvers::{Law, VARIANTS, Variant, find, rapier};
+use simpulse::engine::params::Without;
+use simpulse::engine::solvers::{Law, VARIANTS, Variant, find};
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 
@@ -68,7 +62,7 @@ fn a_pressed_row_does_not_swing_on_its_preload() {
     let disc = |i| SceneBody::dynamic([0.5 + f64::from(i), 0.5], SceneShape::disc(0.5).friction(0.0));
     bodies.extend((0..40).map(disc));
     let scene = Scene { gravity: [-1.0, -10.0], ..Scene::new("row", bodies) };
-    let world = crate::common::run(&scene, crate::common::settings(find("shim").unwrap()), 900);
+    let world = crate::common::run(&scene, crate::common::named("shim"), 900);
     let fastest = world.bodies.velocity_x.iter().fold(0.0f32, |most, v| most.max(v.abs()));
     assert!(fastest < 1e-4, "{fastest} m/s");
 }
@@ -76,7 +70,7 @@ fn a_pressed_row_does_not_swing_on_its_preload() {
 /// Median over the bodies of a pile of 1000 discs of their root mean square speed in the tenth second (m/s).
 fn median_speed(seed: u64, without: Without) -> f64 {
     let scene = simpulse::lab::scenes::load_with_seed("circle_pile:1000", seed).unwrap().scene;
-    let settings = Settings { without, ..crate::common::settings(find("shim").unwrap()) };
+    let settings = Settings { without, ..crate::common::named("shim") };
     let mut world = crate::common::run(&scene, settings, 540);
     let mut squares = vec![0.0; world.bodies.len()];
     for _ in 0..60 {
@@ -123,16 +117,7 @@ fn lemke_and_newton_agree_on_a_stack() {
 /// Root mean square of √(2 E_kin/M) over the third second of a scene (mm/s). `after` is called after each
 /// step. With `parts`, each substep of the standard budget becomes `parts` steps of one substep.
 fn residual_speed(scene: &Scene, solver: &str, parts: Option<u32>, after: impl Fn(&mut World)) -> f64 {
-    residual_speed_of(scene, find(solver).unwrap(), parts, after)
-}
-
-fn residual_speed_of(
-    scene: &Scene,
-    solver: &'static Variant,
-    parts: Option<u32>,
-    after: impl Fn(&mut World),
-) -> f64 {
-    let mut settings = crate::common::settings(solver);
+    let mut settings = crate::common::named(solver);
     let parts = parts.map_or(1, |parts| parts * std::mem::replace(&mut settings.budget.substeps, 1));
     settings.dt /= parts as f32;
     let mut world = scene.build(settings).unwrap();
@@ -141,73 +126,13 @@ fn residual_speed_of(
         world.step().unwrap();
         after(&mut world);
         if step >= 120 * parts {
-            let b = &world.bodies;
-            let moving = (0..b.len()).filter(|&i| b.is_dynamic(i));
-            let (mut energy, mut mass) = (0.0, 0.0);
-            for i in moving {
-                let [m, inertia] = [b.inv_mass[i], b.inv_inertia[i]].map(|inverse| 1.0 / f64::from(inverse));
-                let v = [b.velocity_x[i], b.velocity_y[i], b.angular_velocity[i]].map(f64::from);
-                energy += m * (v[0] * v[0] + v[1] * v[1]) + inertia * v[2] * v[2];
-                mass += m;
-            }
-            squares += energy / mass / f64::from(60 * parts);
+            let mass: f64 =
+                world.bodies.inv_mass.iter().filter(|m| **m > 0.0).map(|m| 1.0 / f64::from(*m)).sum();
+            let [.., energy] = totals(&world);
+            squares += 2.0 * energy / mass / f64::from(60 * parts);
         }
     }
     1e3 * squares.sqrt()
-}
-
-/// Springs that see separations rounded as at a distance of 200 m from the origin.
-#[derive(Clone, Copy, Debug)]
-struct Grainy<R>(R);
-
-impl<R: NormalRule> NormalRule for Grainy<R> {
-    const FRICTION: bool = R::FRICTION;
-
-    fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2] {
-        let far = L::splat(200.0);
-        self.0.line(against_static, (separation + far) - far, mass, old)
-    }
-}
-
-/// `rapier` with these springs.
-static GRAINY: Variant = Variant { name: "grainy", make: || Schedule::boxed(grainy_step), ..rapier::SOLVER };
-
-fn grainy_step(passes: &mut Passes<'_>) {
-    let (budget, h) = (passes.budget(), passes.h());
-    let [hertz, push_speed] = [0, 1].map(|i| passes.parameter(i));
-    let omega = angular_frequencies(hertz, CONTACT_HERTZ_FRACTION, h);
-    let soft = Grainy(Frictionless(Soft::new(omega, CONTACT_DAMPING_RATIO, push_speed, h)));
-    let rigid = Grainy(Soft::without_springs(h));
-    for substep in 0..budget.substeps {
-        if substep == 0 {
-            passes.integrate_velocities();
-            passes.warm_start();
-        } else {
-            passes.integrate_and_warm_start();
-        }
-        for _ in 0..budget.velocity_iterations {
-            passes.block_sweep(Phase::Solve, soft);
-        }
-        passes.integrate_positions();
-        for _ in 0..budget.relax_iterations {
-            passes.block_sweep_normal_first(Phase::Relax, rigid);
-        }
-        passes.end_substep(substep);
-    }
-}
-
-#[test]
-#[ignore = "prints a figure of papers/peers.md"]
-fn speeds_at_rest_with_rounded_separations() {
-    let scene = crate::common::scene("many_pyramids");
-    let speed = |parts, after: fn(&mut World)| residual_speed_of(&scene, &GRAINY, parts, after);
-    let figures = [
-        speed(None, |_| ()),
-        speed(None, round_positions),
-        speed(Some(1), |_| ()),
-        speed(Some(1), round_positions),
-    ];
-    println!("separations in f32: {figures:.5?} mm/s");
 }
 
 /// Discards the low part of positions, as in engines that keep positions in one `f32`.
@@ -256,7 +181,7 @@ fn speeds_at_rest_with_positions_in_f32() {
 #[test]
 fn heavy_boxes_on_pyramids_come_to_rest() {
     let scene = crate::common::scene("high_mass_ratio_1");
-    let world = crate::common::run(&scene, crate::common::settings(find("shim").unwrap()), 1500);
+    let world = crate::common::run(&scene, crate::common::named("shim"), 1500);
     let fastest = fastest(&world);
     // The target of 1e-3 is for speeds averaged over a second and over mass. This is the fastest body of a
     // single step.
@@ -278,7 +203,7 @@ fn weight(world: &World, body: BodyHandle) -> f64 {
 /// Load on the floor of a silo with rough walls after a minute, as a fraction of the weight in it. `only_discs`: instead of
 /// boxes and some discs.
 fn load_of_a_silo(without: Without, only_discs: bool, friction: f64, variation: u32) -> f64 {
-    let mut world = World::new(Settings { without, ..crate::common::settings(find("shim").unwrap()) });
+    let mut world = World::new(Settings { without, ..crate::common::named("shim") });
     world.settings.record_impulses = true;
     let rough = |shape: ShapeDef| shape.with_friction(friction);
     let block = |x, y| rough(ShapeDef::rectangle(x, y).unwrap());
@@ -326,7 +251,7 @@ fn preload_adds_no_load_in_silos() {
 /// Normal forces on a plug after ten seconds and after a minute, in weights. It falls by `drop` (m) into a rough taper, and
 /// stays wedged.
 fn load_of_a_plug(without: Without, degrees: f32, friction: f64, drop: f64) -> [f64; 2] {
-    let mut world = World::new(Settings { without, ..crate::common::settings(find("shim").unwrap()) });
+    let mut world = World::new(Settings { without, ..crate::common::named("shim") });
     world.settings.record_impulses = true;
     let wide = |y: f32| 0.5 + degrees.to_radians().tan() * y;
     let mut add = |body: BodyDef, vertices: [[f32; 2]; 4]| {
@@ -366,7 +291,7 @@ fn preload_presses_no_plug() {
 fn most_piles_of_ragdolls_come_to_rest() {
     let moves = |humans: u32| {
         let scene = crate::common::scene(&format!("ragdolls:{humans}"));
-        let world = crate::common::run(&scene, crate::common::settings(find("shim").unwrap()), 800);
+        let world = crate::common::run(&scene, crate::common::named("shim"), 800);
         fastest(&world) > 0.01
     };
     let restless: Vec<u32> = (3..11).filter(|&humans| moves(humans)).collect();

@@ -1,12 +1,11 @@
 //! Law: rival solvers are as good as their sources.
 
 use crate::common::fastest;
-use simpulse::engine::solvers::find;
 use simpulse::engine::world::World;
 
 /// A scene under a solver at its standard budget, with `substeps` substeps if given.
 fn run(scene: &str, solver: &str, substeps: Option<u32>, steps: u32) -> World {
-    let mut settings = crate::common::settings(find(solver).unwrap());
+    let mut settings = crate::common::named(solver);
     settings.budget.substeps = substeps.unwrap_or(settings.budget.substeps);
     crate::common::run(&crate::common::scene(scene), settings, steps)
 }
@@ -51,7 +50,7 @@ fn avbd_comes_to_rest() {
 #[test]
 fn substeps_hold_higher_than_sweeps() {
     let top = |solver: &str, sweeps: u32| {
-        let mut settings = crate::common::settings(find(solver).unwrap());
+        let mut settings = crate::common::named(solver);
         settings.budget.velocity_iterations = sweeps;
         let mut world = crate::common::scene("stack:20").build(settings).unwrap();
         (0..300).take_while(|_| world.step().is_ok()).count();

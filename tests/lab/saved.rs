@@ -1,6 +1,6 @@
 //! A saved and reloaded world continues as if nothing had happened.
 
-use simpulse::engine::solvers::{VARIANTS, find};
+use simpulse::engine::solvers::VARIANTS;
 use simpulse::engine::world::World;
 
 fn again(world: &World) -> World {
@@ -33,7 +33,7 @@ fn a_saved_world_goes_on_with_the_same_bits() {
 
 #[test]
 fn what_does_not_fit_together_is_refused() {
-    let settings = crate::common::settings(find("avbd").unwrap());
+    let settings = crate::common::named("avbd");
     let world = crate::common::run(&crate::common::scene("pyramid:3"), settings, 20);
     let saved = serde_json::to_value(&world).unwrap();
     let read = |change: &dyn Fn(&mut serde_json::Value)| {

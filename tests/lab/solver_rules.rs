@@ -1,19 +1,14 @@
 //! Solver laws on contacts with hand-computed results.
 
+use crate::common::on_ground;
 use simpulse::engine::constraints::{ImpactLaw, Impacts};
 use simpulse::engine::params::LINEAR_SLOP;
 use simpulse::engine::solvers::{self, VARIANTS};
 use simpulse::engine::world::World;
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 
-/// These bodies on the ground, under gravity.
-fn on_ground(bodies: Vec<SceneBody>) -> Scene {
-    let ground = SceneBody::fixed([0.0, -1.0], SceneShape::rectangle(50.0, 1.0));
-    Scene::new("rules", std::iter::once(ground).chain(bodies).collect())
-}
-
 fn build(scene: Scene, solver: &str) -> World {
-    scene.build(crate::common::settings(solvers::find(solver).unwrap())).unwrap()
+    scene.build(crate::common::named(solver)).unwrap()
 }
 
 fn disc(y: f64) -> SceneBody {

@@ -1,6 +1,6 @@
 //! Law: the number of lanes changes the run time of a step and nothing else.
 
-use crate::common::{run, settings, with_width};
+use crate::common::{named, run, settings, with_width};
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::{VARIANTS, find};
 use simpulse::engine::world::{Order, Settings};
@@ -69,17 +69,17 @@ fn the_same_run_twice_gives_the_same_bits() {
 fn the_order_of_constraints_does_change_the_bits() {
     // Otherwise the hashes above would compare nothing.
     let scene = crate::common::scene("pyramid:10");
-    let colored = run(&scene, settings(find("pgs").unwrap()), 50);
-    let mut natural = settings(find("pgs").unwrap());
+    let colored = run(&scene, named("pgs"), 50);
+    let mut natural = named("pgs");
     (natural.order, natural.width) = (Order::Natural, LaneWidth::W1);
     assert_ne!(colored.state_hash(), run(&scene, natural, 50).state_hash());
 }
 
 #[test]
 fn a_crowded_plate_runs_out_of_colors() {
-    let world = run(&scenes::load("pyramid:4").unwrap().scene, settings(find("soft_step").unwrap()), 1);
+    let world = run(&scenes::load("pyramid:4").unwrap().scene, named("soft_step"), 1);
     assert_eq!(world.counts.overflow, 0);
-    let world = run(&crate::common::scene("crowded_plate"), settings(find("soft_step").unwrap()), 60);
+    let world = run(&crate::common::scene("crowded_plate"), named("soft_step"), 60);
     assert!(world.counts.overflow > 0, "{:?}", world.counts);
 }
 

@@ -39,10 +39,7 @@ impl Builder {
     /// body.
     fn contact(&mut self, a: Option<u32>, b: Option<u32>, point: [f64; 2], normal: [f64; 2], friction: f64) {
         let manifold = self.problem.contacts.last().map_or(0, |c| c.manifold + 1);
-        let r = [a, b].map(|body| {
-            let [x, y] = body.map_or(point, |body| self.centers[body as usize]);
-            [point[0] - x, point[1] - y]
-        });
+        let r = self.arms([a, b], point);
         self.problem.contacts.push(ProblemContact::touching([a, b], manifold, normal, r, friction));
     }
 
@@ -53,15 +50,18 @@ impl Builder {
         self.contact(a, b, points[1], normal, mu);
         self.problem.contacts.last_mut().expect("just pushed").manifold = manifold;
     }
-}
 
-impl Builder {
-    /// Adds a hinge at `point` and returns its index among the joints.
-    fn hinge(&mut self, a: Option<u32>, b: u32, point: [f64; 2]) -> usize {
-        let r = [a, Some(b)].map(|body| {
+    /// From the centers of mass to `point` (m); zero for static bodies.
+    fn arms(&self, bodies: [Option<u32>; 2], point: [f64; 2]) -> [[f64; 2]; 2] {
+        bodies.map(|body| {
             let [x, y] = body.map_or(point, |body| self.centers[body as usize]);
             [point[0] - x, point[1] - y]
-        });
+        })
+    }
+
+    /// Adds a hinge at `point` and returns its index among the joints.
+    fn hinge(&mut self, a: Option<u32>, b: u32, point: [f64; 2]) -> usize {
+        let r = self.arms([a, Some(b)], point);
         self.problem.joints.push(ProblemJoint::revolute([a, Some(b)], r));
         self.problem.joints.len() - 1
     }

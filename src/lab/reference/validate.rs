@@ -12,7 +12,7 @@ struct ProblemPart<'a>(&'a str);
 
 impl ProblemPart<'_> {
     fn require(&self, ok: bool, message: impl FnOnce() -> String) -> Result<(), Error> {
-        if ok { Ok(()) } else { Err(Error::invalid(self.0, message())) }
+        Error::require(ok, self.0, message)
     }
 
     fn finite(&self, values: &[f64]) -> Result<(), Error> {

@@ -44,24 +44,24 @@ impl Scene {
 
     fn check_head(&self) -> Result<(), Error> {
         let name = &self.name;
-        require(!name.trim().is_empty(), "name", || format!("must not be empty, is '{name}'"))?;
+        Error::require(!name.trim().is_empty(), "name", || format!("must not be empty, is '{name}'"))?;
         let plain = !name.chars().any(char::is_control);
-        require(plain, "name", || format!("must not have control characters, is {name:?}"))?;
+        Error::require(plain, "name", || format!("must not have control characters, is {name:?}"))?;
         finite_pair("gravity", self.gravity)?;
         positive("dt", self.dt)?;
         let dt = self.dt;
-        require(dt >= MIN_DT, "dt", || format!("must be at least {MIN_DT:e} s, is {dt:e} s"))?;
-        require(dt <= MAX_DT, "dt", || format!("must be at most {MAX_DT} s, is {dt:e} s"))?;
-        require(LENGTH_UNITS.contains(&self.length_unit), "length_unit", || {
+        Error::require(dt >= MIN_DT, "dt", || format!("must be at least {MIN_DT:e} s, is {dt:e} s"))?;
+        Error::require(dt <= MAX_DT, "dt", || format!("must be at most {MAX_DT} s, is {dt:e} s"))?;
+        Error::require(LENGTH_UNITS.contains(&self.length_unit), "length_unit", || {
             let [least, most] = [LENGTH_UNITS.start(), LENGTH_UNITS.end()];
             format!("must be at least {least:e} m and at most {most:e} m, is {:?} m", self.length_unit)
         })?;
-        require((1..=MAX_STEPS).contains(&self.steps), "steps", || {
+        Error::require((1..=MAX_STEPS).contains(&self.steps), "steps", || {
             format!("must be at least 1 and at most {MAX_STEPS}, is {}", self.steps)
         })?;
         let count = self.bodies.len();
-        require(count > 0, "bodies", || "there are none: a scene needs at least one".to_string())?;
-        require(count <= MAX_BODIES, "bodies", || {
+        Error::require(count > 0, "bodies", || "there are none: a scene needs at least one".to_string())?;
+        Error::require(count <= MAX_BODIES, "bodies", || {
             format!("{count} bodies, where at most {MAX_BODIES} are possible")
         })?;
         self.expect.as_ref().map_or(Ok(()), |expect| expect.validate(self).map_err(|e| e.within("expect")))
@@ -107,17 +107,19 @@ impl Scene {
             let place = format!("joints[{i}].{}", joint.kind.name());
             let (at_b, count) = (format!("{place}.b"), self.bodies.len());
             for (name, body) in [("a", joint.a), ("b", joint.b)] {
-                require(body < count, &format!("{place}.{name}"), || {
+                Error::require(body < count, &format!("{place}.{name}"), || {
                     format!("there is no body {body} among {count}")
                 })?;
             }
-            require(joint.a != joint.b, &at_b, || format!("body {} has no joint to itself", joint.b))?;
+            Error::require(joint.a != joint.b, &at_b, || format!("body {} has no joint to itself", joint.b))?;
             let moves = |body: usize| self.bodies[body].kind == BodyKind::Dynamic;
-            require(moves(joint.a) || moves(joint.b) || joint.kind == JointKind::Filter, &at_b, || {
-                format!("neither body {} nor body {} moves by forces", joint.a, joint.b)
-            })?;
+            Error::require(
+                moves(joint.a) || moves(joint.b) || joint.kind == JointKind::Filter,
+                &at_b,
+                || format!("neither body {} nor body {} moves by forces", joint.a, joint.b),
+            )?;
             for (k, load) in joint.break_load.into_iter().flatten().enumerate() {
-                require(
+                Error::require(
                     (load as f32).is_finite() && load >= 0.0,
                     &format!("{place}.break_load[{k}]"),
                     || format!("must be finite in 32 bits and not negative, is {load:?}"),
@@ -207,21 +209,16 @@ fn geometry(geometry: &Geometry) -> Result<Shape, Error> {
     Ok(shape)
 }
 
-/// The error of a value that is not as it must be.
-pub(super) fn require(holds: bool, place: &str, message: impl FnOnce() -> String) -> Result<(), Error> {
-    if holds { Ok(()) } else { Err(Error::invalid(place, message())) }
+pub(super) fn finite(place: &str, value: f64) -> Result<(), Error> {
+    Error::require((value as f32).is_finite(), place, || format!("must be finite in 32 bits, is {value:?}"))
 }
 
-fn finite(place: &str, value: f64) -> Result<(), Error> {
-    require((value as f32).is_finite(), place, || format!("must be finite in 32 bits, is {value:?}"))
-}
-
-fn finite_pair(place: &str, value: [f64; 2]) -> Result<(), Error> {
+pub(super) fn finite_pair(place: &str, value: [f64; 2]) -> Result<(), Error> {
     (0..2).try_for_each(|k| finite(&format!("{place}[{k}]"), value[k]))
 }
 
-fn positive(place: &str, value: f64) -> Result<(), Error> {
+pub(super) fn positive(place: &str, value: f64) -> Result<(), Error> {
     finite(place, value)?;
     // A value too small for 32 bits becomes zero.
-    require(value as f32 > 0.0, place, || format!("must be positive, is {value:?}"))
+    Error::require(value as f32 > 0.0, place, || format!("must be positive, is {value:?}"))
 }

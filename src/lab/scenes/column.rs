@@ -3,7 +3,7 @@
 use super::holds::Demand;
 use super::parts::{ground_box, ground_line};
 use super::tolerance::Tolerances;
-use super::truth::{rests_at, rests_on_ground};
+use super::truth::rests_at;
 use super::{Entry, Scene, SceneBody, SceneShape};
 use std::f64::consts::PI;
 
@@ -14,9 +14,7 @@ pub(super) const DISCS: Entry = Entry::new("disc_column", "discs of 1 kg on top 
     column("disc_column", count, ground_line(20.0), &disc)
 })
 .sized(10, 1, 1000, "discs")
-.known(|scene, _| rests_on_ground(scene))
-.holds(&[Demand::Stands, Demand::Rests])
-.within(|scene, load| Tolerances::standard(scene).percent(load));
+.pile();
 
 /// Unit boxes, centers at i + ½. The error is how far the topmost has sunk.
 pub(super) const BOXES: Entry = Entry::new("stack", "boxes on top of each other", |count| {

@@ -4,7 +4,7 @@
 //! that it came from. Observers of the catalog that no number describes (the twin of a far stack, the apexes
 //! of a bounce) are found by its name, as long as the bodies are unchanged.
 
-use super::check::require;
+use super::check::{finite, finite_pair, positive};
 use super::holds::Demand;
 use super::tolerance::Tolerances;
 use super::truth::{Truth, greatest_drop, load_on_ground, rests_at};
@@ -75,22 +75,16 @@ pub enum Measure {
 impl Expect {
     /// Rejects invalid expectations. Errors name places within `expect`.
     pub(super) fn validate(&self, scene: &Scene) -> Result<(), Error> {
-        let positive = |place: &str, value: f64| {
-            let holds = value > 0.0 && (value as f32).is_finite();
-            require(holds, place, || format!("must be positive and finite, is {value}"))
-        };
         self.stays_within.map_or(Ok(()), |limit| positive("stays_within", limit))?;
         if let Some([low, high]) = self.stays_inside {
-            let finite = |x: f64| (x as f32).is_finite();
-            let holds = (0..2).all(|k| low[k] < high[k] && finite(low[k]) && finite(high[k]));
-            require(holds, "stays_inside", || {
+            [low, high].into_iter().try_for_each(|corner| finite_pair("stays_inside", corner))?;
+            Error::require((0..2).all(|k| low[k] < high[k]), "stays_inside", || {
                 format!("the first corner must be below and left of the second: {low:?}, {high:?}")
             })?;
         }
         let Some(KnownValue { measure, body, value, tolerance }) = &self.reference else { return Ok(()) };
         positive("reference.tolerance", *tolerance)?;
-        let finite = (*value as f32).is_finite();
-        require(finite, "reference.value", || format!("must be finite, is {value}"))?;
+        finite("reference.value", *value)?;
         let is_dynamic = |i: &usize| scene.bodies.get(*i).is_some_and(|body| body.kind == BodyKind::Dynamic);
         let wrong = match (measure, body) {
             (Measure::RestingHeight, None) => "missing: the bodies whose height is known".to_string(),

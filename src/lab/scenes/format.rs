@@ -94,7 +94,7 @@ pub struct SceneBody {
     #[serde(default, skip_serializing_if = "is_no_group")]
     pub group: i32,
     /// Whether dynamic bodies stop it, too, if it is fast and continuous collision is on.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub bullet: bool,
     /// Shapes that move as one.
     pub shapes: Vec<SceneShape>,
@@ -302,10 +302,6 @@ fn is_origin(point: &[f64; 2]) -> bool {
 
 fn is_no_group(group: &i32) -> bool {
     *group == 0
-}
-
-fn is_false(value: &bool) -> bool {
-    !*value
 }
 
 fn is_default_density(value: &f64) -> bool {

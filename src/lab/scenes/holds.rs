@@ -268,7 +268,7 @@ fn centers(world: &World) -> Vec<DVec2> {
 }
 
 /// Kinetic and potential energy of the dynamic bodies (J).
-pub(super) fn energies(world: &World) -> [f64; 2] {
+pub(in crate::lab) fn energies(world: &World) -> [f64; 2] {
     let gravity = DVec2::from(world.settings.gravity.map(f64::from));
     let dynamic = (0..world.bodies.len()).filter(|&i| world.bodies.is_dynamic(i));
     let states = dynamic.map(|i| BodyState::of(&world.bodies, i, gravity));

@@ -47,6 +47,7 @@ pub use format::{
 };
 pub use joints::SceneJoint;
 pub(in crate::lab) use truth::largest;
+use truth::rests_on_ground;
 pub use truth::{Observer, Truth};
 
 use crate::lab::error::Error;
@@ -124,8 +125,6 @@ pub struct Entry {
     pub seeded: Option<fn(u32, u64) -> Scene>,
     /// The known value of a scene of that size, for a run of its `steps` at its `dt`.
     pub truth: Option<fn(&Scene, u32) -> Truth>,
-    /// Properties that are known without building the scene, for scenes that may be very large.
-    pub outline: Option<fn(u32) -> Outline>,
     /// Conditions on a run, in addition to those on every run: nothing blows up or passes through static
     /// bodies.
     pub demands: &'static [Demand],
@@ -149,20 +148,10 @@ pub struct Size {
     pub meaning: &'static str,
 }
 
-/// Properties that follow from the size of a scene.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outline {
-    /// Number of bodies.
-    pub bodies: usize,
-    /// Reference value, in the unit that all sizes have in common.
-    pub reference: f64,
-}
-
 impl Entry {
     const fn new(name: &'static str, summary: &'static str, build: fn(u32) -> Scene) -> Self {
         let tolerances = |scene: &Scene, _| Tolerances::standard(scene);
-        let (size, seeded, truth, outline) = (None, None, None, None);
-        Self { name, summary, size, build, seeded, truth, outline, demands: &[], tolerances }
+        Self { name, summary, size: None, build, seeded: None, truth: None, demands: &[], tolerances }
     }
 
     const fn sized(self, default: u32, min: u32, max: u32, meaning: &'static str) -> Self {
@@ -177,8 +166,11 @@ impl Entry {
         Self { truth: Some(truth), ..self }
     }
 
-    const fn outlined(self, outline: fn(u32) -> Outline) -> Self {
-        Self { outline: Some(outline), ..self }
+    /// A pile that must stand and rest, with its weight on the ground known to a percent.
+    const fn pile(self) -> Self {
+        self.known(|scene, _| rests_on_ground(scene))
+            .holds(&[Demand::Stands, Demand::Rests])
+            .within(|scene, load| Tolerances::standard(scene).percent(load))
     }
 
     const fn holds(self, demands: &'static [Demand]) -> Self {
@@ -271,90 +263,4 @@ fn load_with(name: &str, seed: Option<u64>) -> Result<Loaded, Error> {
         scene.name = format!("{}:{size}", entry.name);
     }
     Ok(entry.loaded(scene, size))
-}
-
-/// Description of a scene without its bodies.
-#[derive(Clone, Debug)]
-pub struct Description {
-    /// Name, with its size.
-    pub name: String,
-    /// Number of bodies.
-    pub bodies: usize,
-    /// Number of steps of a run.
-    pub steps: u32,
-    /// Length of a step (s).
-    pub dt: f64,
-    /// Gravity (m/s²).
-    pub gravity: [f64; 2],
-    /// Quantity, value and unit of the reference value.
-    pub reference: Option<(&'static str, f64, &'static str)>,
-    /// Conditions that a run has to meet.
-    pub demands: Vec<Demand>,
-    /// Limits on the errors of a run.
-    pub tolerances: Tolerances,
-    /// Conditions that are not checked, in words.
-    pub unchecked: Vec<String>,
-}
-
-impl Description {
-    /// Describes a scene that is built.
-    pub fn of(loaded: &Loaded) -> Self {
-        let Loaded { scene, truth, demands, tolerances, unchecked } = loaded;
-        Description {
-            name: scene.name.clone(),
-            bodies: scene.bodies.len(),
-            steps: scene.steps,
-            dt: scene.dt,
-            gravity: scene.gravity,
-            reference: truth.as_ref().map(|t| (t.quantity, t.expected, t.unit)),
-            demands: demands.clone(),
-            tolerances: *tolerances,
-            unchecked: unchecked.clone(),
-        }
-    }
-}
-
-/// Describes a scene of the catalog. A scene that may be very large is not built: its smallest size gives
-/// what all sizes have in common, and its [`Outline`] the rest.
-///
-/// Errors: as [`load`].
-pub fn describe(name: &str, seed: Option<u64>) -> Result<Description, Error> {
-    let (entry, size) = entry_of(name)?;
-    let (Some(outline), Some(Size { min, .. })) = (entry.outline, entry.size) else {
-        return Ok(Description::of(&load_with(name, seed)?));
-    };
-    let Outline { bodies, reference } = outline(size);
-    let smallest = (entry.build)(min);
-    let mut tolerances = (entry.tolerances)(&smallest, reference);
-    let common = Description::of(&entry.loaded(smallest, min));
-    tolerances.rest = common.tolerances.rest;
-    Ok(Description {
-        name: format!("{}:{size}", entry.name),
-        bodies,
-        reference: common.reference.map(|(quantity, _, unit)| (quantity, reference, unit)),
-        tolerances,
-        ..common
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_outline_says_what_the_scene_itself_does() {
-        let words = |d: &Description| format!("{d:?}");
-        let mut outlined = 0;
-        for entry in CATALOG.iter().filter(|e| e.outline.is_some()) {
-            for size in [1, 2, 7, 30] {
-                let name = format!("{}:{size}", entry.name);
-                let made = Description::of(&load(&name).unwrap());
-                assert_eq!(words(&describe(&name, None).unwrap()), words(&made), "{name}");
-                outlined += 1;
-            }
-        }
-        assert!(outlined >= 8);
-        assert_eq!(words(&describe("arch", None).unwrap()), words(&Description::of(&load("arch").unwrap())));
-        assert!(describe("pyramid:1001", None).unwrap_err().to_string().contains("1001"));
-    }
 }

@@ -1,29 +1,14 @@
 //! B7, C9 and D: pyramids of boxes.
 
-use super::holds::Demand;
 use super::parts::ground_box;
-use super::tolerance::Tolerances;
-use super::truth::rests_on_ground;
-use super::{Entry, Outline, Scene, SceneBody, SceneShape};
-
-/// Weight of a box of 1 m² and 1 kg/m² (N).
-const BOX_WEIGHT: f64 = 10.0;
+use super::{Entry, Scene, SceneBody, SceneShape};
 
 pub(super) const PYRAMID: Entry = Entry::new("pyramid", "a pyramid of boxes", |base| scene("pyramid", base))
     .sized(10, 1, 1000, "boxes in the lowest row")
-    .outlined(|base| {
-        let boxes = base as usize * (base as usize + 1) / 2;
-        Outline { bodies: 1 + boxes, reference: boxes as f64 * BOX_WEIGHT }
-    })
-    .known(|scene, _| rests_on_ground(scene))
-    .holds(&[Demand::Stands, Demand::Rests])
-    .within(|scene, load| Tolerances::standard(scene).percent(load));
+    .pile();
 
 pub(super) const LARGE: Entry =
-    Entry::new("large_pyramid", "a pyramid of 5050 boxes", |_| scene("large_pyramid", 100).steps(500))
-        .known(|scene, _| rests_on_ground(scene))
-        .holds(&[Demand::Stands, Demand::Rests])
-        .within(|scene, load| Tolerances::standard(scene).percent(load));
+    Entry::new("large_pyramid", "a pyramid of 5050 boxes", |_| scene("large_pyramid", 100).steps(500)).pile();
 
 pub(super) const MANY: Entry = Entry::new(
     "many_pyramids",
@@ -47,13 +32,7 @@ pub(super) const MANY: Entry = Entry::new(
     },
 )
 .sized(20, 1, 100, "floors")
-.outlined(|floors| {
-    let (floors, boxes) = (floors as usize, 55 * (floors * floors) as usize);
-    Outline { bodies: floors + boxes, reference: boxes as f64 * BOX_WEIGHT }
-})
-.known(|scene, _| rests_on_ground(scene))
-.holds(&[Demand::Stands, Demand::Rests])
-.within(|scene, load| Tolerances::standard(scene).percent(load));
+.pile();
 
 fn scene(name: &str, base: u32) -> Scene {
     let corner = [-0.5 * f64::from(base), 0.0];

@@ -205,10 +205,7 @@ pub(super) static CASES: &[Case] = &[
                 SceneBody::dynamic([0.0, 0.23], disc).moving([0.0, -10.0], 0.0),
             ];
             let scene = Scene::new("energy", bodies);
-            let energy = |world: &World| {
-                let potential: f64 = dynamic(world).map(|(i, m, _)| m * G * center(world, i)[1]).sum();
-                kinetic_energy(world) + potential
-            };
+            let energy = |world: &World| energies(world).iter().sum::<f64>();
             let start = energy(&lab.world(scene.clone())?);
             let mut most = start;
             lab.run(scene, 0.1, |world| most = largest([most, energy(world)]))?;

@@ -13,6 +13,7 @@ use crate::engine::params::{CONTACT_HERTZ, DEFAULT_GRAVITY, LINEAR_SLOP, Without
 use crate::engine::solvers::Variant;
 use crate::engine::world::Settings;
 use crate::lab::scenes;
+pub(super) use crate::lab::scenes::holds::energies;
 use std::ops::Range;
 
 /// What a case measures.
@@ -212,11 +213,7 @@ pub(super) fn dynamic(world: &World) -> impl Iterator<Item = (usize, f64, f64)> 
 
 /// Kinetic energy of all dynamic bodies (J).
 pub(super) fn kinetic_energy(world: &World) -> f64 {
-    let of = |(i, m, inertia): (usize, f64, f64)| {
-        let ([x, y], w) = (velocity(world, i), spin(world, i));
-        0.5 * (m * (x * x + y * y) + inertia * w * w)
-    };
-    dynamic(world).map(of).sum()
+    energies(world)[0]
 }
 
 /// Gaps of all joints (m).
