@@ -310,12 +310,7 @@ residual (weights of the lighter body)";
 /// `2 of 3, 1.2 mm, 4e-3` for the settings of a solver in an order. A setting at several lane widths counts
 /// once.
 fn in_order(scene: &[Record], solver: &str, order: Order) -> String {
-    let mut own: Vec<&Record> = Vec::new();
-    for record in scene.iter().filter(|r| r.solver == solver && r.order == order) {
-        if !own.iter().any(|other| answer::same(other, record)) {
-            own.push(record);
-        }
-    }
+    let own = answer::each_setting(scene.iter().filter(|r| r.solver == solver && r.order == order));
     let held: Vec<&Record> = own.iter().copied().filter(|r| r.holds()).collect();
     let median = |axis: ErrorAxis| {
         let mut values: Vec<f64> = held.iter().filter_map(|r| axis.of(r)).collect();

@@ -1,6 +1,5 @@
 //! The charts of a study. A setting is drawn at its fastest lane width.
 
-use crate::engine::constraints::Impacts;
 use crate::lab::chart::scale::number;
 use crate::lab::chart::{self, Axis, Chart, ChartMark, FailStrip, LineStyle, Scale, Series, Style};
 use crate::lab::report::by_scene;
@@ -14,22 +13,9 @@ pub fn scenes(records: &[Record]) -> Vec<&[Record]> {
     records.chunk_by(|a, b| a.scene == b.scene).collect()
 }
 
-/// Every setting of a scene at its fastest width. For settings that failed, the width is arbitrary.
-pub fn fastest(scene: &[Record]) -> Vec<&Record> {
-    let mut kept: Vec<&Record> = Vec::new();
-    for record in scene {
-        match kept.iter_mut().find(|k| answer::same(k, record)) {
-            Some(other) if record.cost_ns() < other.cost_ns() => *other = record,
-            Some(_) => {}
-            None => kept.push(record),
-        }
-    }
-    kept
-}
-
 /// The middle one of a solver's settings; of those in colored order if there are any.
 pub fn standard<'a>(scene: &'a [Record], solver: &str) -> Option<&'a Record> {
-    let own: Vec<&Record> = fastest(scene).into_iter().filter(|r| r.solver == solver).collect();
+    let own: Vec<&Record> = answer::each_setting(scene).into_iter().filter(|r| r.solver == solver).collect();
     let colored: Vec<&Record> = own.iter().copied().filter(|r| !r.order.is_serial()).collect();
     let own = if colored.is_empty() { own } else { colored };
     own.get(own.len() / 2).copied()
@@ -82,7 +68,7 @@ fn name(scene: &[Record], axis: ErrorAxis) -> Option<(String, &'static str)> {
 
 /// Time against each error of a scene.
 pub fn precision(scene: &[Record]) -> Vec<Chart> {
-    let settings = fastest(scene);
+    let settings = answer::each_setting(scene);
     let chart = |error| name(scene, error).map(|name| precision_chart(scene, &settings, error, name));
     ErrorAxis::ALL.into_iter().filter_map(chart).collect()
 }
@@ -111,11 +97,14 @@ fn precision_chart(
         Series { line: LineStyle::Steps, width: 6, opacity: 0.3, ..Series::line(Style::neutral(), front) };
     let mut series = vec![front];
     for solver in solvers_of(scene) {
-        let kinds =
-            [true, false].into_iter().flat_map(|serial| Impacts::ALL.map(|impacts| (serial, impacts)));
-        for (serial, impacts) in kinds {
-            let own = settings.iter().filter(|r| r.solver == solver);
-            let own = own.filter(|r| (r.order.is_serial(), r.impacts) == (serial, impacts));
+        let of = |r: &Record| (r.order.is_serial(), r.impacts, r.frozen);
+        let mut kinds = Vec::new();
+        for record in settings.iter().filter(|r| r.solver == solver) {
+            kinds.extend((!kinds.contains(&of(record))).then_some(of(record)));
+        }
+        for kind in kinds {
+            let own = settings.iter().filter(|r| r.solver == solver && of(r) == kind);
+            let serial = kind.0;
             let mark = |(i, record): (usize, &&Record)| {
                 let time = time(record)?;
                 let what = format!("{solver}, {}: {}", words(record), si(time, "s"));
@@ -164,12 +153,14 @@ pub fn overview(records: &[Record]) -> Option<Chart> {
     // The record, its time relative to the fastest, and the number of the setting among those of its solver.
     let mut dots: Vec<(&Record, f64, usize)> = Vec::new();
     for scene in scenes(records) {
-        let settings: Vec<&Record> = fastest(scene).into_iter().filter(|r| !r.order.is_serial()).collect();
+        let settings: Vec<&Record> =
+            answer::each_setting(scene).into_iter().filter(|r| !r.order.is_serial()).collect();
         let least =
             settings.iter().filter(|r| r.holds()).filter_map(|r| time(r)).fold(f64::INFINITY, f64::min);
         for solver in solvers_of(records).into_iter().filter(|_| least.is_finite()) {
-            // Other treatments of impacts are separate runs that do not exist on every scene.
-            let own = settings.iter().filter(|r| r.solver == solver && r.impacts == scene[0].impacts);
+            // Other treatments of contacts are separate runs that do not exist on every scene.
+            let first = (scene[0].impacts, scene[0].frozen);
+            let own = settings.iter().filter(|r| r.solver == solver && (r.impacts, r.frozen) == first);
             dots.extend(own.enumerate().filter_map(|(i, r)| Some((*r, time(r)? / least, i))));
         }
     }
@@ -317,7 +308,9 @@ pub fn iterations(records: &[Record]) -> Vec<Chart> {
         for error in [ErrorAxis::Penetration, ErrorAxis::Law] {
             let unit = error.unit(scene);
             let series = |solver: &'static str| {
-                let own = fastest(scene).into_iter().filter(|r| r.solver == solver && !r.order.is_serial());
+                let own = answer::each_setting(scene)
+                    .into_iter()
+                    .filter(|r| r.solver == solver && !r.order.is_serial());
                 let mark = |r: &Record| {
                     let (sweeps, value) = (r.sample.as_ref()?.load.sweeps.max(0.5), drawn(r, error)?);
                     let what = format!("{solver}, {}: {} sweeps", r.budget_text, number(sweeps));
@@ -351,7 +344,7 @@ pub fn sweep(scene: &[Record], swept: Swept) -> Vec<Chart> {
 
 /// The chart of an error, or of the time.
 fn sweep_chart(scene: &[Record], swept: Swept, error: Option<ErrorAxis>, unit: &str) -> Chart {
-    let settings = fastest(scene);
+    let settings = answer::each_setting(scene);
     let is_dt = swept.name == "dt";
     // Steps of different length are compared by their time per second of the scene.
     let value = |r: &Record| match error {
