@@ -1,7 +1,7 @@
 //! The charts of a study. A setting is drawn at its fastest lane width.
 
 use crate::lab::chart::scale::number;
-use crate::lab::chart::{self, Axis, Chart, ChartMark, FailStrip, LineStyle, Scale, Series, Style};
+use crate::lab::chart::{Axis, Chart, ChartMark, FailStrip, LineStyle, Scale, Series, Style};
 use crate::lab::report::by_scene;
 use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, solvers_of};
 use crate::lab::study::sweep::Swept;
@@ -401,22 +401,6 @@ fn sweep_chart(scene: &[Record], swept: Swept, error: Option<ErrorAxis>, unit: &
     }
 }
 
-/// `speed_vs_error.svg`, or `sweep.svg` of a sweep: the charts of every scene in a row.
-pub fn file(records: &[Record]) -> String {
-    let swept = records.iter().find_map(|r| r.swept);
-    let row = |scene: &[Record]| {
-        let charts = swept.map_or_else(|| precision(scene), |swept| sweep(scene, swept));
-        (scene[0].scene.clone(), charts)
-    };
-    let rows: Vec<_> = scenes(records).into_iter().map(row).collect();
-    let title = match swept {
-        Some(swept) => format!("Time and errors against {}", swept.name),
-        None => "Time of a step against error: lower left is better; hollow: natural order".to_string(),
-    };
-    let names: Vec<_> = solvers_of(records).into_iter().map(|solver| (solver, Style::of(solver))).collect();
-    chart::file(&title, &names, &rows)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -441,9 +425,6 @@ mod tests {
             assert_eq!(svg.matches("<title>pgs").count(), 5, "{svg}");
             assert_eq!(svg.matches("fell at step 100").count(), 1);
         }
-        let picture = file(&records);
-        assert_eq!(picture.matches("<svg ").count(), 4);
-        assert_eq!(picture.matches("<svg ").count(), picture.matches("</svg>").count());
     }
 
     #[test]
@@ -451,11 +432,11 @@ mod tests {
         let quantity = "ground load while the heavy disc rests on the light one, last second";
         let truth = Some(TruthError { quantity, unit: "N", expected: 1.0, error: Some(1.0) });
         let records = [Record { truth, ..record(8, 1, 1.0, 1.0) }, Record { truth, ..fell(8, 2, 1.0, 1.0) }];
-        let picture = file(&records);
+        let picture: String = precision(&records).iter().map(Chart::svg).collect();
         for part in ["time of a step", "last second", "fell at step 100", "fails"] {
             assert!(picture.contains(part), "{part}: {picture}");
         }
         assert!(!picture.to_lowercase().contains("nan"));
-        assert!(overview(&[failed(8)]).is_none() && !file(&[failed(8)]).contains("<title>"));
+        assert!(overview(&[failed(8)]).is_none());
     }
 }
