@@ -4,12 +4,10 @@
 pub mod answer;
 #[doc(hidden)]
 pub mod by_scene;
-#[doc(hidden)]
 pub mod columns;
 #[doc(hidden)]
 pub mod doc;
 pub mod environment;
-pub mod export;
 #[doc(hidden)]
 pub mod html;
 pub mod study_file;
@@ -78,7 +76,7 @@ pub fn tables(records: &[Record]) -> String {
 pub fn write_study(folder: &Path, study: &StudyFile) -> Result<Vec<PathBuf>, Error> {
     let contents = [
         ("tables.txt", tables(&study.records).into_bytes()),
-        ("study.csv", export::csv(&study.records, &study.environment)?),
+        ("study.csv", columns::study_csv(&study.records, &study.environment)?),
         (study_file::NAME, study.to_json()?),
     ];
     files::prepare_folder(folder)?;

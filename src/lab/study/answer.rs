@@ -2,6 +2,7 @@
 
 use super::Record;
 use super::compare::compare;
+use super::curve::distinct;
 use std::cmp::Ordering;
 
 /// The recommendable settings of a scene. A setting is a solver, an order and a budget, at its fastest lane
@@ -76,12 +77,7 @@ impl<'a> Answer<'a> {
 
     /// The other solvers with a setting that ties with the cheapest one, the fastest first.
     pub fn tied_solvers(&self) -> Vec<&'static str> {
-        let mut names: Vec<&'static str> = self.best().iter().map(|best| best.solver).collect();
-        for record in self.tied() {
-            if !names.contains(&record.solver) {
-                names.push(record.solver);
-            }
-        }
+        let names = distinct(self.best().into_iter().chain(self.tied()).map(|record| record.solver));
         names.into_iter().skip(1).collect()
     }
 

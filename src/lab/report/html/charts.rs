@@ -3,7 +3,7 @@
 use crate::lab::chart::scale::number;
 use crate::lab::chart::{Axis, Chart, ChartMark, FailStrip, LineStyle, Scale, Series, Style};
 use crate::lab::report::by_scene;
-use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, solvers_of};
+use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, distinct, solvers_of};
 use crate::lab::study::sweep::Swept;
 use crate::lab::study::{Record, answer};
 use crate::lab::units::{lanes, si};
@@ -98,11 +98,7 @@ fn precision_chart(
     let mut series = vec![front];
     for solver in solvers_of(scene) {
         let of = |r: &Record| (r.order.is_serial(), r.impacts, r.frozen);
-        let mut kinds = Vec::new();
-        for record in settings.iter().filter(|r| r.solver == solver) {
-            kinds.extend((!kinds.contains(&of(record))).then_some(of(record)));
-        }
-        for kind in kinds {
+        for kind in distinct(settings.iter().filter(|r| r.solver == solver).map(|r| of(r))) {
             let own = settings.iter().filter(|r| r.solver == solver && of(r) == kind);
             let serial = kind.0;
             let mark = |(i, record): (usize, &&Record)| {
