@@ -31,7 +31,7 @@ Examples:
 /// Without a command, runs the default study: a solver of every family on scenes that are hard or
 /// whose reference value is known, at lane widths 1, 4, 8 and 16 and up to three budgets each. It prints
 /// the cheapest setting that is good enough on each scene and a ranking, and writes report.html,
-/// tables.txt, study.csv, study.json and speed_vs_error.svg.
+/// tables.txt, study.csv and study.json.
 #[derive(Parser, Debug)]
 #[command(version, after_help = EXAMPLES, max_term_width = 100, args_conflicts_with_subcommands = true)]
 pub struct Cli {

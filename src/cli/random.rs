@@ -2,12 +2,15 @@
 
 use super::output::{note, print, print_json, value};
 use super::progress::Bar;
+use super::values::{FrozenArgs, SettingArgs};
 use super::verify::VerifyArgs;
 use crate::engine::solvers::{DEFAULT, Variant, find};
 use crate::engine::world::Settings;
 use crate::lab::error::Error;
 use crate::lab::files;
+use crate::lab::overrides::{self, Override};
 use crate::lab::report::environment::Environment;
+use crate::lab::study::budget;
 use crate::lab::torture::families::{FAMILIES, Family};
 use crate::lab::torture::minimize::minimize;
 use crate::lab::torture::table::{lines, text};
@@ -68,6 +71,24 @@ pub struct RandomArgs {
     /// Continuous collision: stop fast bodies at the surfaces that they would pass through [default: the solver's]
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true", requires = "random")]
     pub continuous: Option<bool>,
+    /// Substeps; scenes that set their own keep it [default: the solver's]
+    #[arg(long, value_name = "N", requires = "random")]
+    pub substeps: Option<u32>,
+    /// Velocity sweeps per substep [default: the solver's]
+    #[arg(long, value_name = "N", requires = "random")]
+    pub velocity_iterations: Option<u32>,
+    /// Relaxation sweeps per substep [default: the solver's]
+    #[arg(long, value_name = "N", requires = "random")]
+    pub relax_iterations: Option<u32>,
+    /// Position sweeps per substep [default: the solver's]
+    #[arg(long, value_name = "N", requires = "random")]
+    pub position_iterations: Option<u32>,
+    /// Solver parameters, such as `contact_hertz=60`
+    #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',', requires = "random")]
+    pub set: Vec<Override>,
+    /// Frozen contacts
+    #[command(flatten)]
+    pub frozen: FrozenArgs,
     /// Write every scene that fails, minimized, into this folder
     #[arg(long, value_name = "DIR", requires = "random")]
     pub keep: Option<PathBuf>,
@@ -85,14 +106,40 @@ pub struct RandomArgs {
 
 impl VerifyArgs {
     fn settings(&self, solver: &'static Variant) -> Result<Settings, Error> {
-        let (own, without) = (Settings::new(solver), self.without.of(solver)?);
-        let (impacts, continuous) = (self.impacts.impacts, self.random.continuous.unwrap_or(own.continuous));
-        Ok(Settings { continuous, without, impacts, ..own })
+        let RandomArgs { substeps, velocity_iterations, relax_iterations, position_iterations, .. } =
+            self.random;
+        let (set, frozen) = (self.random.set.clone(), self.random.frozen);
+        let (impacts, without) = (self.impacts, self.without.clone());
+        let own = SettingArgs {
+            solver,
+            substeps,
+            velocity_iterations,
+            relax_iterations,
+            position_iterations,
+            set,
+            impacts,
+            frozen,
+            without,
+        };
+        let own = own.settings()?;
+        Ok(Settings { continuous: self.random.continuous.unwrap_or(own.continuous), ..own })
     }
 
     /// Name of a solver in rows, with the options that differ from its defaults.
-    fn name(&self, solver: &Variant) -> String {
-        let mut name = solver.name.to_string();
+    ///
+    /// Errors: those of its settings.
+    fn name(&self, solver: &'static Variant) -> Result<String, Error> {
+        let (mut name, own) = (solver.name.to_string(), self.settings(solver)?);
+        if own.budget != solver.budget {
+            name += &format!(", {}", budget::brief(&own.budget, solver));
+        }
+        let changed = overrides::changed(solver, &own.parameters);
+        if !changed.is_empty() {
+            name += &format!(", {changed}");
+        }
+        if own.frozen != Default::default() {
+            name += &format!(", frozen {}", own.frozen);
+        }
         match self.random.continuous {
             Some(true) if !solver.continuous => name += ", continuous",
             Some(false) if solver.continuous => name += ", not continuous",
@@ -104,7 +151,7 @@ impl VerifyArgs {
         if !self.without.without.is_empty() {
             name += &format!(", without {}", self.without.without.join(" "));
         }
-        name
+        Ok(name)
     }
 
     /// The wanted scenes.
@@ -133,7 +180,7 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
         false => args.solvers.chosen(),
     };
     let own = &args.random;
-    let names: Vec<String> = solvers.iter().map(|v| args.name(v)).collect();
+    let names = solvers.iter().map(|v| args.name(v)).collect::<Result<Vec<String>, Error>>()?;
     if let Some(folder) = &own.keep {
         files::prepare_folder(folder)?;
     }
@@ -251,6 +298,6 @@ fn one(
             folder.join(format!("{}_{number}_{}_{name}_{verdict}.json", family.name, args.random.seed));
         files::write(&path, least.scene.to_json().as_bytes())?;
     }
-    let (family, solver) = (family.name.to_string(), args.name(solver));
+    let (family, solver) = (family.name.to_string(), args.name(solver)?);
     Ok(TortureRow { seed: args.random.seed, family, number, solver, outcome })
 }

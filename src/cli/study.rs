@@ -12,10 +12,11 @@ use crate::engine::world::Order;
 use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::overrides::{self, Override};
-use crate::lab::report::study_file::{StudyFile, differing_settings};
+use crate::lab::report::study_file::{StudyFile, differing_settings, settings};
 use crate::lab::report::{self, answer, by_scene, html, sweep};
 use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::study::budget::BudgetGrid;
+use crate::lab::study::curve::distinct;
 use crate::lab::study::found::{self, Found, FoundBudgets};
 use crate::lab::study::sweep::QuantitySweep;
 use crate::lab::study::{self, Progress, Record, StudyPlan, telling};
@@ -162,18 +163,20 @@ impl StudyArgs {
             // A sweep draws one curve per solver, so it needs one width and one order.
             (base.widths, base.orders) = (vec![native_width()], vec![Order::Colored]);
         }
-        let or = |given: &[String], own: Vec<String>| if given.is_empty() { own } else { unique(given) };
+        let or = |given: &[String], own: Vec<String>| {
+            if given.is_empty() { own } else { distinct(given.iter().cloned()) }
+        };
         Ok(StudyPlan {
             scenes: or(&self.scenes, base.scenes),
             solvers: self.solvers.chosen(),
             widths: values::widths(&self.lanes, base.widths),
-            orders: if self.orders.is_empty() { base.orders } else { unique(&self.orders) },
+            orders: if self.orders.is_empty() { base.orders } else { distinct(self.orders.clone()) },
             impacts: match (self.impacts.is_empty(), sweep.is_some()) {
-                (false, _) => unique(&self.impacts),
+                (false, _) => distinct(self.impacts.clone()),
                 (true, true) => vec![Impacts::Own],
                 (true, false) => base.impacts,
             },
-            frozen: if self.frozen.is_empty() { base.frozen } else { unique(&self.frozen) },
+            frozen: if self.frozen.is_empty() { base.frozen } else { distinct(self.frozen.clone()) },
             budgets: BudgetGrid {
                 substeps: self.substeps.clone(),
                 velocity_iterations: self.velocity_iterations.clone(),
@@ -213,17 +216,6 @@ fn tolerances(given: &[String]) -> Result<GivenTolerances, Error> {
         *place = Some(quantity("tolerance", value, unit)?);
     }
     Ok(tolerances)
-}
-
-/// The values without duplicates, in the order given.
-fn unique<T: PartialEq + Clone>(values: &[T]) -> Vec<T> {
-    let mut kept: Vec<T> = Vec::new();
-    for value in values {
-        if !kept.contains(value) {
-            kept.push(value.clone());
-        }
-    }
-    kept
 }
 
 /// A part of a study. It consists of whole scenes, so that all times of a scene come from one machine.
@@ -394,7 +386,7 @@ fn kept_note(kept: &Option<PathBuf>) -> String {
 /// The study in a folder, to go on with. Errors: none there; a study with other settings.
 fn earlier(out: &Path, plan: &StudyPlan) -> Result<StudyFile, Error> {
     let earlier = StudyFile::read(out)?;
-    let list: Vec<String> = differing_settings(&earlier.settings, &report::export::settings(plan))
+    let list: Vec<String> = differing_settings(&earlier.settings, &settings(plan))
         .into_iter()
         .filter(|(name, _)| name != "budget_search")
         .map(|(name, [there, here])| format!("{name} is {there} there, {here} here"))

@@ -32,7 +32,7 @@
 //!
 //! ```
 //! use simpulse::engine::solvers::find;
-//! use simpulse::lab::report::export;
+//! use simpulse::lab::report::columns::study_csv;
 //! use simpulse::lab::report::environment::Environment;
 //! use simpulse::lab::study::{self, StudyPlan};
 //!
@@ -42,7 +42,7 @@
 //!     ..StudyPlan::quick()
 //! };
 //! let records = study::run(&plan, &|_| (), &mut |_, _| Ok(()))?;
-//! let text = String::from_utf8(export::csv(&records, &Environment::current())?)?;
+//! let text = String::from_utf8(study_csv(&records, &Environment::current())?)?;
 //! let mut rows = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
 //! let head = rows.next().ok_or("no header")?;
 //! let solver = head.iter().position(|&name| name == "solver").ok_or("no solver")?;

@@ -235,7 +235,7 @@ fn a_small_study_leaves_whole_files() {
     let answer = succeeds(folder.path(), &format!("study {options}"));
     let out = folder.path().join("a/b");
     let kept: Vec<String> = entries(&out).into_iter().filter(|n| !n.starts_with("replay-")).collect();
-    let names = ["report.html", "speed_vs_error.svg", "study.csv", "study.json", "tables.txt"];
+    let names = ["report.html", "study.csv", "study.json", "tables.txt"];
     assert_eq!(kept, names);
 
     let mut reader = csv::Reader::from_path(out.join("study.csv")).unwrap();
@@ -272,9 +272,7 @@ fn a_small_study_leaves_whole_files() {
     assert!(json["environment"]["compiler"].as_str().unwrap().starts_with("rustc 1."));
     assert_eq!(json["settings"]["repeats"], 1);
 
-    let svg = std::fs::read_to_string(out.join("speed_vs_error.svg")).unwrap();
-    assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>") && svg.contains("stack:3"));
-    for text in [csv_text.as_str(), &json_text, &svg, &answer] {
+    for text in [csv_text.as_str(), &json_text, &answer] {
         assert!(!has_word(text, "nan") && !has_word(text, "inf"), "{text}");
     }
     assert!(answer.contains("The cheapest setting that is good enough") && answer.lines().count() <= 60);
@@ -302,8 +300,6 @@ fn the_answer_comes_first_and_fills_a_page_at_most() {
 fn a_sweep_leaves_a_curve_per_solver() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("o");
-    std::fs::create_dir(&out).unwrap();
-    std::fs::write(out.join("speed_vs_error.svg"), "of an earlier study").unwrap();
     let words =
         "--quick --scenes stack:3 --solvers pgs,soft_step,tgs_soft --sweep contact-hertz=60,15,30 --out o";
     let output = simpulse(folder.path(), words);
@@ -313,8 +309,6 @@ fn a_sweep_leaves_a_curve_per_solver() {
     let lines = shown.lines().filter(|line| line.starts_with("soft_step ") || line.starts_with("tgs_soft "));
     assert_eq!(lines.count(), 2 * 3, "{shown}");
 
-    let files = entries(&out);
-    assert!(files.contains(&"sweep.svg".to_string()) && !files.contains(&"speed_vs_error.svg".to_string()));
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("--sweep contact_hertz=15,30,60") && page.contains("contact_hertz"), "{page}");
     let study = StudyFile::read(&out).unwrap();

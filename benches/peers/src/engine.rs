@@ -137,14 +137,14 @@ impl Contender {
     }
 }
 
-/// All contenders: every engine at its defaults (n = 4) and, unless `quick`, at 2 and 8 substeps, and at 8
-/// substeps with contacts twice as stiff, the stiffest that Box2D's clamp allows there. The other widths and
+/// All contenders: every engine at its defaults (n = 4) and, unless `quick`, at 2 and 8 substeps, and at 8 and 14
+/// substeps with contacts of 60 and 105 Hz, the stiffest that Box2D's clamp allows there. The other widths and
 /// broad phase of this crate run too, and the other engines without contact recycling.
 pub fn contenders(quick: bool) -> Vec<Contender> {
     let ours = |width| Maker::Simpulse(width, BroadPhaseKind::default());
     let native = native_width();
     let default = [(4, 30.0)];
-    let all_settings = [(2, 30.0), (4, 30.0), (8, 30.0), (8, 60.0)];
+    let all_settings = [(2, 30.0), (4, 30.0), (8, 30.0), (8, 60.0), (14, 105.0)];
     let every = if quick { &default[..] } else { &all_settings[..] };
     let mut all = Vec::new();
     let mut add = |maker, settings: &[(u32, f32)]| {
@@ -163,6 +163,9 @@ pub fn contenders(quick: bool) -> Vec<Contender> {
     add(Maker::Solver("shim"), &[(14, 30.0), (8, 30.0), (3, 30.0)]);
     for name in ["box2d", "rapier"] {
         add(Maker::Solver(name), &default);
+    }
+    if !quick {
+        add(Maker::Solver("tgs_ngs"), &all_settings[1..3]);
     }
     let anew = |maker| Contender { recycling: false, ..Contender::new(maker, 4, false) };
     all.extend([Maker::Box2d, Maker::Rapier].map(anew));

@@ -82,7 +82,7 @@ struct Args {
     /// Write the step times of each of these scenes to this CSV file
     #[arg(long, value_name = "FILE", requires = "pace")]
     log: Option<PathBuf>,
-    /// Run nothing; draw peers.svg again from the peers.csv in the folder
+    /// Run nothing; draw peers.svg again from the peers.csv in the folder, and print the errors at equal time
     #[arg(long)]
     draw: bool,
     /// Folder for peers.csv and peers.svg
@@ -152,12 +152,13 @@ fn run(args: &Args) -> Result<(), String> {
     draw(&args.out)
 }
 
-/// Draws peers.svg from the peers.csv in the folder.
+/// Draws peers.svg from the peers.csv in the folder, and prints the errors at the time of `shim`.
 fn draw(out: &Path) -> Result<(), String> {
     let [csv, svg] = ["peers.csv", "peers.svg"].map(|name| out.join(name));
     let rows = csv::Reader::from_path(&csv).and_then(|mut rows| rows.deserialize().collect());
     let rows: Vec<picture::Row> = rows.map_err(|e: csv::Error| format!("{}: {e}", csv.display()))?;
     std::fs::write(&svg, picture::svg(&rows)?).map_err(|e| format!("{}: {e}", svg.display()))?;
+    println!("\n{}\n", picture::equal_times(&rows));
     println!("{}", svg.display());
     Ok(())
 }

@@ -47,6 +47,33 @@ fn engine(row: &Row, own: &str) -> Option<usize> {
     }
 }
 
+/// A time up to this factor above that of `shim` counts as no longer.
+const LONGER: f64 = 1.1;
+
+/// The least mean overlap of each engine within the time of `shim` at its defaults, in Markdown, with its setting and
+/// its share of that time.
+pub fn equal_times(rows: &[Row]) -> String {
+    let mut text = format!("| scene | {} |\n|---|---|---|---|---|", ENGINES.join(" | "));
+    for scene in rows.chunk_by(|a, b| a.scene == b.scene) {
+        let own = scene.iter().find(|r| r.engine.starts_with("simpulse")).map_or("", |r| &r.engine);
+        let of = |k: usize| scene.iter().filter(move |row| engine(row, own) == Some(k));
+        let timed = |row: &Row| Some((row.mean_step_ms?, row.penetration_mean_m?));
+        let Some((limit, _)) = of(3).find(|row| row.substeps == 14).and_then(timed) else { continue };
+        let cell = |k: usize| {
+            let settings = of(k).filter_map(|row| Some((row, timed(row)?)));
+            let fitting = settings.filter(|(_, (ms, _))| *ms <= LONGER * limit);
+            fitting.min_by(|a, b| a.1.1.total_cmp(&b.1.1)).map_or(
+                "–".to_string(),
+                |(row, (ms, overlap))| {
+                    format!("{} ({}, {:.2})", si_short(overlap, "m"), setting(row), ms / limit)
+                },
+            )
+        };
+        text += &format!("\n| {} | {} |", scene[0].scene, [0, 1, 2, 3].map(cell).join(" | "));
+    }
+    text
+}
+
 /// The picture of all rows of a race, as SVG text.
 pub fn svg(rows: &[Row]) -> Result<String, String> {
     let mut text = String::new();

@@ -130,7 +130,8 @@ fn step(passes: &mut Passes<'_>) {
             let joints =
                 if is_small && system.has_joints() { system.joint_blocks() } else { JointBlocks::default() };
             let rows = joints.blocks.iter().map(|block| block.size).sum::<usize>();
-            (is_small && points + rows / 2 <= largest).then(|| Newton::new(system, &rule, rebounds.as_mut(), joints, h))
+            (is_small && points + rows / 2 <= largest)
+                .then(|| Newton::new(system, &rule, rebounds.as_mut(), joints, h))
         };
         let mut newton = passes.with_system(Phase::Solve, begin);
         passes.give_back(rebounds);

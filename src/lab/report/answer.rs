@@ -9,7 +9,7 @@ use crate::engine::world::Order;
 use crate::lab::scenes::CATALOG;
 use crate::lab::scenes::holds::HORIZON;
 use crate::lab::scenes::tolerance::Accuracy;
-use crate::lab::study::answer::{Answer, fails_last, order, same};
+use crate::lab::study::answer::{Answer, each_setting, fails_last, order};
 use crate::lab::study::class::SceneClass;
 use crate::lab::study::compare::Ratio;
 use crate::lab::study::curve::{ErrorAxis, solvers_of};
@@ -334,14 +334,7 @@ fn runner_up(answer: &Answer, best: &Record) -> [String; 2] {
 
 /// Settings that are good enough in the run but fail in the extended run, once per setting.
 fn fails_later(records: &[Record]) -> Vec<(&Record, String)> {
-    let mut found: Vec<(&Record, String)> = Vec::new();
-    for record in records {
-        let Some(why) = record.fails_later() else { continue };
-        if !found.iter().any(|(other, _)| other.scene == record.scene && same(other, record)) {
-            found.push((record, why));
-        }
-    }
-    found
+    each_setting(records).into_iter().filter_map(|record| Some((record, record.fails_later()?))).collect()
 }
 
 /// One of these settings as text.
@@ -444,12 +437,7 @@ pub fn later_table(records: &[Record]) -> String {
     let head = ["scene", "solver", "budget", "µs/step", "", "speed at rest"];
     let caption = format!("Extended to {HORIZON} s, untimed");
     let mut rows = DocTable { wide: true, ..DocTable::new(caption, 3, &head) };
-    let mut seen: Vec<&Record> = Vec::new();
-    for record in records.iter().filter(|r| r.later.is_some()) {
-        if seen.iter().any(|other| other.scene == record.scene && same(other, record)) {
-            continue;
-        }
-        seen.push(record);
+    for record in each_setting(records.iter().filter(|r| r.later.is_some())) {
         let why = record.fails_later().unwrap_or("stands".into());
         let speed = record.later.and_then(|l| l.rest_speed_m_s).map_or("–".into(), |v| si(v, "m/s"));
         let cells = [record.scene.clone(), record.solver.into(), record.budget_text.clone()];

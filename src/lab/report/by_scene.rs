@@ -5,7 +5,7 @@ use super::units::{bodies, digits, is_emulated, ratio, si};
 use crate::engine::world::Order;
 use crate::lab::metrics::Errors;
 use crate::lab::scenes::tolerance::Accuracy;
-use crate::lab::study::curve::{ErrorAxis, solvers_of};
+use crate::lab::study::curve::{ErrorAxis, distinct, solvers_of};
 use crate::lab::study::profile::Profile;
 use crate::lab::study::{Fronts, Record, TruthError, answer};
 
@@ -213,17 +213,6 @@ pub fn frozen_table(records: &[Record]) -> Option<DocTable> {
 
 /// Such a table; a line per solver and value. Scenes on which a solver ran with one value only are left out.
 fn treatments(name: &str, records: &[Record], of: impl Fn(&Record) -> String) -> Option<DocTable> {
-    let values_of = |records: &mut dyn Iterator<Item = &Record>| {
-        let mut values: Vec<String> = records.map(&of).collect();
-        let mut kept = Vec::new();
-        values.retain(|value| {
-            !kept.contains(value) && {
-                kept.push(value.clone());
-                true
-            }
-        });
-        kept
-    };
     let caption = format!(
         "What {name} gain and cost: scenes on which the solver is good enough, and on which it is so (+) or not (−) only \
          with them; time: of its cheapest good setting over that of its first line, geometric mean"
@@ -234,11 +223,10 @@ fn treatments(name: &str, records: &[Record], of: impl Fn(&Record) -> String) ->
     };
     for solver in solvers_of(records) {
         let own = |r: &&Record| r.solver == solver;
-        let values = values_of(&mut records.iter().filter(own));
-        let scenes: Vec<&[Record]> = records
-            .chunk_by(|a, b| a.scene == b.scene)
-            .filter(|scene| values_of(&mut scene.iter().filter(own)).len() > 1)
-            .collect();
+        let values_of = |records: &[Record]| distinct(records.iter().filter(own).map(&of));
+        let values = values_of(records);
+        let scenes: Vec<&[Record]> =
+            records.chunk_by(|a, b| a.scene == b.scene).filter(|scene| values_of(scene).len() > 1).collect();
         let Some(first) = values.first().filter(|_| !scenes.is_empty()) else { continue };
         // The time of the cheapest setting that is good enough (ns), infinite without one.
         let best = |scene: &[Record], value: &String, accuracy: Accuracy| {
@@ -310,12 +298,7 @@ residual (weights of the lighter body)";
 /// `2 of 3, 1.2 mm, 4e-3` for the settings of a solver in an order. A setting at several lane widths counts
 /// once.
 fn in_order(scene: &[Record], solver: &str, order: Order) -> String {
-    let mut own: Vec<&Record> = Vec::new();
-    for record in scene.iter().filter(|r| r.solver == solver && r.order == order) {
-        if !own.iter().any(|other| answer::same(other, record)) {
-            own.push(record);
-        }
-    }
+    let own = answer::each_setting(scene.iter().filter(|r| r.solver == solver && r.order == order));
     let held: Vec<&Record> = own.iter().copied().filter(|r| r.holds()).collect();
     let median = |axis: ErrorAxis| {
         let mut values: Vec<f64> = held.iter().filter_map(|r| axis.of(r)).collect();

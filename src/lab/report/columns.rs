@@ -423,7 +423,19 @@ pub fn text() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lab::study::record::tests::record;
     use std::collections::BTreeSet;
+
+    #[test]
+    fn every_column_is_documented() {
+        let bytes = study_csv(&[record(8, 1, 1.0, 0.0)], &Environment::current()).unwrap();
+        let text = String::from_utf8(bytes).unwrap();
+        let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+        assert!(STUDY.documents(&header), "{header:?}");
+        assert_eq!(text.lines().nth(1).unwrap().split(',').count(), header.len());
+        // Terms must be consistent with other studies, so these synonyms are not allowed.
+        assert!(header.iter().all(|n| !n.contains("law") && !n.contains("truth") && !n.contains("mark")));
+    }
 
     #[test]
     fn a_header_is_documented_or_not() {

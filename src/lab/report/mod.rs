@@ -4,12 +4,10 @@
 pub mod answer;
 #[doc(hidden)]
 pub mod by_scene;
-#[doc(hidden)]
 pub mod columns;
 #[doc(hidden)]
 pub mod doc;
 pub mod environment;
-pub mod export;
 #[doc(hidden)]
 pub mod html;
 pub mod study_file;
@@ -27,12 +25,17 @@ use crate::lab::study::{Record, found};
 use std::path::{Path, PathBuf};
 use study_file::StudyFile;
 
-/// File names of pictures.
-const SWEEP: &str = "sweep.svg";
-const SPEED: &str = "speed_vs_error.svg";
-
-/// Files of a study, besides its recordings.
-const FILES: [&str; 7] = [SWEEP, SPEED, "tables.txt", "study.csv", study_file::NAME, found::NAME, html::NAME];
+/// Files of a study, besides its recordings; the pictures are of earlier versions.
+const FILES: [&str; 8] = [
+    "tables.txt",
+    "study.csv",
+    study_file::NAME,
+    found::NAME,
+    html::NAME,
+    "speed_vs_error.svg",
+    "sweep.svg",
+    "profiles.svg",
+];
 
 /// Moves the study that a folder holds to `previous/N` below it, with the first free number N, so that no study
 /// is ever overwritten. Returns the new place; `None` if the folder holds no study.
@@ -68,31 +71,19 @@ pub fn tables(records: &[Record]) -> String {
     text + &by_scene::treatment_tables(records).iter().map(|t| format!("\n{}", t.text())).collect::<String>()
 }
 
-/// Writes `tables.txt`, `study.csv`, `study.json` and a picture (`speed_vs_error.svg`, or `sweep.svg`) into `folder`, and
-/// the [page](html) made from these and the folder's other files. Returns their paths. If an earlier study was of the other kind, its picture is removed.
-///
-/// Everything except the page is prepared before the first file is written.
+/// Writes `tables.txt`, `study.csv` and `study.json` into `folder`, and the [page](html) made from these and the
+/// folder's other files. Returns their paths. Everything except the page is prepared before the first file is written.
 pub fn write_study(folder: &Path, study: &StudyFile) -> Result<Vec<PathBuf>, Error> {
-    let records = &study.records;
-    let mut contents = vec![
-        ("tables.txt", tables(records).into_bytes()),
-        ("study.csv", export::csv(records, &study.environment)?),
-        ("study.json", study.to_json()?),
+    let contents = [
+        ("tables.txt", tables(&study.records).into_bytes()),
+        ("study.csv", columns::study_csv(&study.records, &study.environment)?),
+        (study_file::NAME, study.to_json()?),
     ];
-    let picture = if sweep::is_sweep(records) { SWEEP } else { SPEED };
-    contents.push((picture, html::charts::file(records).into_bytes()));
     files::prepare_folder(folder)?;
-    for name in [SWEEP, SPEED].into_iter().filter(|name| contents.iter().all(|c| c.0 != *name)) {
-        let path = folder.join(name);
-        if path.exists() {
-            std::fs::remove_file(&path).map_err(Error::io(&path))?;
-        }
-    }
     let mut paths = Vec::new();
     for (name, bytes) in contents {
-        let path = folder.join(name);
-        files::write(&path, &bytes)?;
-        paths.push(path);
+        paths.push(folder.join(name));
+        files::write(&folder.join(name), &bytes)?;
     }
     paths.push(html::write(folder, study)?);
     Ok(paths)

@@ -1,12 +1,16 @@
 //! `study.json`: all settings and measurements of a study, written and read back.
 
-use super::columns::SCHEMA;
+use super::columns::{SCHEMA, decimal};
 use super::environment::Environment;
-use super::export::settings;
+use crate::engine::params;
+use crate::engine::solvers::Uses;
+use crate::engine::world::Settings;
 use crate::lab::error::Error;
-use crate::lab::study::{Record, StudyPlan};
+use crate::lab::overrides;
+use crate::lab::study::curve::distinct;
+use crate::lab::study::{Record, StudyPlan, search};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -41,6 +45,61 @@ pub struct ShardInfo {
     pub scenes: Vec<String>,
 }
 
+/// All settings of a study, chosen by the caller or constant.
+pub fn settings(plan: &StudyPlan) -> Value {
+    #[derive(serde::Serialize)]
+    struct ExportedSolver {
+        name: &'static str,
+        source: &'static str,
+        standard_budget: params::Budget,
+        uses: Uses,
+        parameters: serde_json::Map<String, Value>,
+    }
+    let solver = |v: &&'static crate::engine::solvers::Variant| ExportedSolver {
+        name: v.name,
+        source: v.source,
+        standard_budget: v.budget,
+        uses: v.uses,
+        parameters: overrides::values(v, &plan.overrides)
+            .map_or_else(|_| Default::default(), |values| overrides::by_name(v, &values)),
+    };
+    let standard = plan.solvers.first().map(|v| {
+        let s = Settings::new(v);
+        json!({
+            "broadphase": format!("{:?}", s.broadphase),
+            "integrator": s.integrator,
+            "rotation": s.rotation,
+        })
+    });
+    json!({
+        "scenes": plan.scenes,
+        "solvers": plan.solvers.iter().map(solver).collect::<Vec<_>>(),
+        "lanes": plan.widths.iter().map(|w| w.lanes()).collect::<Vec<_>>(),
+        "orders": plan.orders,
+        "impacts": plan.impacts,
+        "frozen": plan.frozen.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "budgets": plan.budgets,
+        "budget_search": plan.searched().then(|| json!({"rule": search::rule(), "not_searched": plan.not_searched()})),
+        "steps": plan.steps,
+        "timing_steps": plan.timing_steps,
+        "repeats": plan.repeats,
+        "set": plan.overrides,
+        "sweep": plan.sweep,
+        "tolerance": plan.tolerances,
+        "found_to_rest": plan.rests,
+        "seed": plan.seed,
+        "world": standard,
+        "constants": {
+            "linear_slop_m": decimal(params::LINEAR_SLOP),
+            "speculative_distance_m": decimal(params::SPECULATIVE_DISTANCE),
+            "aabb_margin_m": decimal(params::AABB_MARGIN),
+            "restitution_threshold_m_s": decimal(params::RESTITUTION_THRESHOLD),
+            "max_position_correction_m": decimal(params::MAX_POSITION_CORRECTION),
+            "diverged_speed_m_s": decimal(params::DIVERGED_SPEED),
+        },
+    })
+}
+
 /// The settings with different values in two studies: name, and both values as short text.
 pub fn differing_settings(one: &Value, other: &Value) -> Vec<(String, [String; 2])> {
     let maps = [one, other].map(|settings| settings.as_object().cloned().unwrap_or_default());
@@ -69,13 +128,18 @@ impl StudyFile {
 
     /// The rest of a study that was interrupted, together with what was finished before.
     pub fn after(self, earlier: &StudyFile) -> StudyFile {
-        let parts = [earlier, &self].into_iter().flat_map(|part| match part.parts.is_empty() {
-            true => vec![ShardInfo { environment: part.environment.clone(), scenes: part.scenes() }],
-            false => part.parts.clone(),
-        });
+        let parts = [earlier, &self].into_iter().flat_map(StudyFile::all_parts);
         let parts = parts.filter(|part| !part.scenes.is_empty()).collect();
         let records = earlier.records.iter().cloned().chain(self.records).collect();
         StudyFile { environment: earlier.environment.clone(), parts, records, ..self }
+    }
+
+    /// Its parts; itself if it was not merged.
+    fn all_parts(&self) -> Vec<ShardInfo> {
+        match self.parts.is_empty() {
+            true => vec![ShardInfo { environment: self.environment.clone(), scenes: self.scenes() }],
+            false => self.parts.clone(),
+        }
     }
 
     /// Merges parts with the same settings into one study; `names` are the names of the parts in errors.
@@ -113,12 +177,7 @@ impl StudyFile {
                 }
                 found.push((scene, name));
             }
-            match part.parts.is_empty() {
-                true => whole
-                    .parts
-                    .push(ShardInfo { environment: part.environment.clone(), scenes: part.scenes() }),
-                false => whole.parts.extend(part.parts.iter().cloned()),
-            }
+            whole.parts.extend(part.all_parts());
         }
         let plan = |study: &StudyFile| -> Vec<String> {
             let list = study.settings.get("scenes").and_then(Value::as_array).into_iter().flatten();
@@ -127,12 +186,8 @@ impl StudyFile {
         // Scenes that a part did not finish, and scenes that no part had in its plan.
         let finished =
             |name: &String| parts.iter().any(|p| plan(p).contains(name) && !p.missing_scenes.contains(name));
-        let missing: Vec<String> = parts.iter().flat_map(|p| p.missing_scenes.clone()).collect();
-        for name in missing {
-            if !finished(&name) && !whole.missing_scenes.contains(&name) {
-                whole.missing_scenes.push(name);
-            }
-        }
+        let missing = parts.iter().flat_map(|p| p.missing_scenes.clone());
+        whole.missing_scenes = distinct(missing.filter(|name| !finished(name)));
         let plans: Vec<Vec<String>> = parts.iter().map(plan).collect();
         let scenes =
             in_turns(plans.iter().map(|p| p.iter().map(|name| vec![name.clone()]).collect()).collect());

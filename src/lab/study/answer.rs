@@ -2,6 +2,7 @@
 
 use super::Record;
 use super::compare::compare;
+use super::curve::distinct;
 use std::cmp::Ordering;
 
 /// The recommendable settings of a scene. A setting is a solver, an order and a budget, at its fastest lane
@@ -28,14 +29,8 @@ impl<'a> Answer<'a> {
         let scene = &records.first()?.scene;
         let is_good = |r: &Record| r.excess_at(share) <= 1.0;
         let timed: Vec<&Record> = records.iter().filter(|r| r.sample.is_some()).collect();
-        let mut good: Vec<&Record> = Vec::new();
-        let mut sorted: Vec<&Record> = timed.iter().copied().filter(|r| is_good(r)).collect();
-        sorted.sort_by(|a, b| a.cost_ns().total_cmp(&b.cost_ns()));
-        for record in sorted {
-            if !good.iter().any(|other| same(other, record)) {
-                good.push(record);
-            }
-        }
+        let mut good = each_setting(timed.iter().copied().filter(|r| is_good(r)));
+        good.sort_by(|a, b| a.cost_ns().total_cmp(&b.cost_ns()));
         // Compared by blocks of the same rounds, another setting may be faster than the one with the least
         // cost.
         let faster = |a: &Record, b: &Record| order(a, b).is_lt();
@@ -82,12 +77,7 @@ impl<'a> Answer<'a> {
 
     /// The other solvers with a setting that ties with the cheapest one, the fastest first.
     pub fn tied_solvers(&self) -> Vec<&'static str> {
-        let mut names: Vec<&'static str> = self.best().iter().map(|best| best.solver).collect();
-        for record in self.tied() {
-            if !names.contains(&record.solver) {
-                names.push(record.solver);
-            }
-        }
+        let names = distinct(self.best().into_iter().chain(self.tied()).map(|record| record.solver));
         names.into_iter().skip(1).collect()
     }
 
@@ -106,6 +96,19 @@ pub fn fails_last<'a>(records: impl IntoIterator<Item = &'a Record>) -> Option<&
 /// Which of two records is faster; `Equal` if it is too close to call.
 pub fn order(a: &Record, b: &Record) -> Ordering {
     a.sample.as_ref().zip(b.sample.as_ref()).map_or(Ordering::Equal, |(a, b)| compare(a, b))
+}
+
+/// Every setting once, at its fastest lane width. For settings that failed, the width is arbitrary.
+pub fn each_setting<'a>(records: impl IntoIterator<Item = &'a Record>) -> Vec<&'a Record> {
+    let mut kept: Vec<&Record> = Vec::new();
+    for record in records {
+        match kept.iter_mut().find(|k| same(k, record)) {
+            Some(other) if record.cost_ns() < other.cost_ns() => *other = record,
+            Some(_) => {}
+            None => kept.push(record),
+        }
+    }
+    kept
 }
 
 /// Whether two records differ at most in their lane width.

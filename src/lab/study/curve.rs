@@ -75,15 +75,20 @@ impl ErrorAxis {
     }
 }
 
-/// Solvers, in the order in which they were tried.
-pub fn solvers_of(records: &[Record]) -> Vec<&'static str> {
-    let mut solvers = Vec::new();
-    for record in records {
-        if !solvers.contains(&record.solver) {
-            solvers.push(record.solver);
+/// The values without duplicates, in order.
+pub fn distinct<T: PartialEq>(values: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut kept = Vec::new();
+    for value in values {
+        if !kept.contains(&value) {
+            kept.push(value);
         }
     }
-    solvers
+    kept
+}
+
+/// Solvers, in the order in which they were tried.
+pub fn solvers_of(records: &[Record]) -> Vec<&'static str> {
+    distinct(records.iter().map(|r| r.solver))
 }
 
 #[cfg(test)]

@@ -130,8 +130,9 @@ pub struct Later {
 
 impl Record {
     /// Key that all widths of one setting of a scene share.
-    pub fn setting(&self) -> (&'static str, Budget, Order, Impacts, Freezing, Option<Swept>, &str) {
-        (self.solver, self.budget, self.order, self.impacts, self.frozen, self.swept, &self.parameters)
+    pub fn setting(&self) -> impl PartialEq {
+        let chosen = (self.budget, self.order, self.impacts, self.frozen, self.parameters.as_str());
+        (self.scene.as_str(), self.solver, chosen, self.swept)
     }
 
     /// The settings of its run; those of a sweep of features lack the extra ones.

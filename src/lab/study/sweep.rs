@@ -5,6 +5,7 @@
 //! scene has no reference value, because those of the catalog hold for the scene's own friction.
 
 use super::budget::{self, BudgetGrid};
+use super::curve::distinct;
 use crate::engine::constraints::Features;
 use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::{VARIANTS, Variant};
@@ -107,12 +108,7 @@ impl FromStr for QuantitySweep {
         let own =
             || parameters().find(|p| p.name == snake).map(|p| (p.name, p.unit, QuantityKind::Parameter));
         let Some((name, unit, kind)) = fixed.or_else(own) else {
-            let mut known: Vec<&str> = QUANTITIES.iter().map(|q| q.0).collect();
-            for parameter in parameters() {
-                if !known.contains(&parameter.name) {
-                    known.push(parameter.name);
-                }
-            }
+            let known = distinct(QUANTITIES.iter().map(|q| q.0).chain(parameters().map(|p| p.name)));
             return Err(Error::unknown("quantity to sweep", &snake, known.into_iter()));
         };
         if values.trim().is_empty() {

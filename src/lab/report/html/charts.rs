@@ -1,10 +1,9 @@
 //! The charts of a study. A setting is drawn at its fastest lane width.
 
-use crate::engine::constraints::Impacts;
 use crate::lab::chart::scale::number;
-use crate::lab::chart::{self, Axis, Chart, ChartMark, FailStrip, LineStyle, Scale, Series, Style};
+use crate::lab::chart::{Axis, Chart, ChartMark, FailStrip, LineStyle, Scale, Series, Style};
 use crate::lab::report::by_scene;
-use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, solvers_of};
+use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, distinct, solvers_of};
 use crate::lab::study::sweep::Swept;
 use crate::lab::study::{Record, answer};
 use crate::lab::units::{lanes, si};
@@ -14,22 +13,9 @@ pub fn scenes(records: &[Record]) -> Vec<&[Record]> {
     records.chunk_by(|a, b| a.scene == b.scene).collect()
 }
 
-/// Every setting of a scene at its fastest width. For settings that failed, the width is arbitrary.
-pub fn fastest(scene: &[Record]) -> Vec<&Record> {
-    let mut kept: Vec<&Record> = Vec::new();
-    for record in scene {
-        match kept.iter_mut().find(|k| answer::same(k, record)) {
-            Some(other) if record.cost_ns() < other.cost_ns() => *other = record,
-            Some(_) => {}
-            None => kept.push(record),
-        }
-    }
-    kept
-}
-
 /// The middle one of a solver's settings; of those in colored order if there are any.
 pub fn standard<'a>(scene: &'a [Record], solver: &str) -> Option<&'a Record> {
-    let own: Vec<&Record> = fastest(scene).into_iter().filter(|r| r.solver == solver).collect();
+    let own: Vec<&Record> = answer::each_setting(scene).into_iter().filter(|r| r.solver == solver).collect();
     let colored: Vec<&Record> = own.iter().copied().filter(|r| !r.order.is_serial()).collect();
     let own = if colored.is_empty() { own } else { colored };
     own.get(own.len() / 2).copied()
@@ -82,7 +68,7 @@ fn name(scene: &[Record], axis: ErrorAxis) -> Option<(String, &'static str)> {
 
 /// Time against each error of a scene.
 pub fn precision(scene: &[Record]) -> Vec<Chart> {
-    let settings = fastest(scene);
+    let settings = answer::each_setting(scene);
     let chart = |error| name(scene, error).map(|name| precision_chart(scene, &settings, error, name));
     ErrorAxis::ALL.into_iter().filter_map(chart).collect()
 }
@@ -111,11 +97,10 @@ fn precision_chart(
         Series { line: LineStyle::Steps, width: 6, opacity: 0.3, ..Series::line(Style::neutral(), front) };
     let mut series = vec![front];
     for solver in solvers_of(scene) {
-        let kinds =
-            [true, false].into_iter().flat_map(|serial| Impacts::ALL.map(|impacts| (serial, impacts)));
-        for (serial, impacts) in kinds {
-            let own = settings.iter().filter(|r| r.solver == solver);
-            let own = own.filter(|r| (r.order.is_serial(), r.impacts) == (serial, impacts));
+        let of = |r: &Record| (r.order.is_serial(), r.impacts, r.frozen);
+        for kind in distinct(settings.iter().filter(|r| r.solver == solver).map(|r| of(r))) {
+            let own = settings.iter().filter(|r| r.solver == solver && of(r) == kind);
+            let serial = kind.0;
             let mark = |(i, record): (usize, &&Record)| {
                 let time = time(record)?;
                 let what = format!("{solver}, {}: {}", words(record), si(time, "s"));
@@ -164,12 +149,14 @@ pub fn overview(records: &[Record]) -> Option<Chart> {
     // The record, its time relative to the fastest, and the number of the setting among those of its solver.
     let mut dots: Vec<(&Record, f64, usize)> = Vec::new();
     for scene in scenes(records) {
-        let settings: Vec<&Record> = fastest(scene).into_iter().filter(|r| !r.order.is_serial()).collect();
+        let settings: Vec<&Record> =
+            answer::each_setting(scene).into_iter().filter(|r| !r.order.is_serial()).collect();
         let least =
             settings.iter().filter(|r| r.holds()).filter_map(|r| time(r)).fold(f64::INFINITY, f64::min);
         for solver in solvers_of(records).into_iter().filter(|_| least.is_finite()) {
-            // Other treatments of impacts are separate runs that do not exist on every scene.
-            let own = settings.iter().filter(|r| r.solver == solver && r.impacts == scene[0].impacts);
+            // Other treatments of contacts are separate runs that do not exist on every scene.
+            let first = (scene[0].impacts, scene[0].frozen);
+            let own = settings.iter().filter(|r| r.solver == solver && (r.impacts, r.frozen) == first);
             dots.extend(own.enumerate().filter_map(|(i, r)| Some((*r, time(r)? / least, i))));
         }
     }
@@ -317,7 +304,9 @@ pub fn iterations(records: &[Record]) -> Vec<Chart> {
         for error in [ErrorAxis::Penetration, ErrorAxis::Law] {
             let unit = error.unit(scene);
             let series = |solver: &'static str| {
-                let own = fastest(scene).into_iter().filter(|r| r.solver == solver && !r.order.is_serial());
+                let own = answer::each_setting(scene)
+                    .into_iter()
+                    .filter(|r| r.solver == solver && !r.order.is_serial());
                 let mark = |r: &Record| {
                     let (sweeps, value) = (r.sample.as_ref()?.load.sweeps.max(0.5), drawn(r, error)?);
                     let what = format!("{solver}, {}: {} sweeps", r.budget_text, number(sweeps));
@@ -351,7 +340,7 @@ pub fn sweep(scene: &[Record], swept: Swept) -> Vec<Chart> {
 
 /// The chart of an error, or of the time.
 fn sweep_chart(scene: &[Record], swept: Swept, error: Option<ErrorAxis>, unit: &str) -> Chart {
-    let settings = fastest(scene);
+    let settings = answer::each_setting(scene);
     let is_dt = swept.name == "dt";
     // Steps of different length are compared by their time per second of the scene.
     let value = |r: &Record| match error {
@@ -408,22 +397,6 @@ fn sweep_chart(scene: &[Record], swept: Swept, error: Option<ErrorAxis>, unit: &
     }
 }
 
-/// `speed_vs_error.svg`, or `sweep.svg` of a sweep: the charts of every scene in a row.
-pub fn file(records: &[Record]) -> String {
-    let swept = records.iter().find_map(|r| r.swept);
-    let row = |scene: &[Record]| {
-        let charts = swept.map_or_else(|| precision(scene), |swept| sweep(scene, swept));
-        (scene[0].scene.clone(), charts)
-    };
-    let rows: Vec<_> = scenes(records).into_iter().map(row).collect();
-    let title = match swept {
-        Some(swept) => format!("Time and errors against {}", swept.name),
-        None => "Time of a step against error: lower left is better; hollow: natural order".to_string(),
-    };
-    let names: Vec<_> = solvers_of(records).into_iter().map(|solver| (solver, Style::of(solver))).collect();
-    chart::file(&title, &names, &rows)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -448,9 +421,6 @@ mod tests {
             assert_eq!(svg.matches("<title>pgs").count(), 5, "{svg}");
             assert_eq!(svg.matches("fell at step 100").count(), 1);
         }
-        let picture = file(&records);
-        assert_eq!(picture.matches("<svg ").count(), 4);
-        assert_eq!(picture.matches("<svg ").count(), picture.matches("</svg>").count());
     }
 
     #[test]
@@ -458,11 +428,11 @@ mod tests {
         let quantity = "ground load while the heavy disc rests on the light one, last second";
         let truth = Some(TruthError { quantity, unit: "N", expected: 1.0, error: Some(1.0) });
         let records = [Record { truth, ..record(8, 1, 1.0, 1.0) }, Record { truth, ..fell(8, 2, 1.0, 1.0) }];
-        let picture = file(&records);
+        let picture: String = precision(&records).iter().map(Chart::svg).collect();
         for part in ["time of a step", "last second", "fell at step 100", "fails"] {
             assert!(picture.contains(part), "{part}: {picture}");
         }
         assert!(!picture.to_lowercase().contains("nan"));
-        assert!(overview(&[failed(8)]).is_none() && !file(&[failed(8)]).contains("<title>"));
+        assert!(overview(&[failed(8)]).is_none());
     }
 }

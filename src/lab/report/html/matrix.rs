@@ -3,6 +3,7 @@
 use crate::lab::chart::scale::number;
 use crate::lab::picture::Color;
 use crate::lab::report::doc::{DocBlock, DocCell, DocTable, Tone};
+use crate::lab::study::curve::distinct;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -64,12 +65,7 @@ fn word(value: &Value) -> String {
 
 /// The matrix as a table.
 pub fn matrix(matrix: &VerifyFile) -> Vec<DocBlock> {
-    let mut solvers: Vec<&str> = Vec::new();
-    for outcome in &matrix.results {
-        if !solvers.contains(&outcome.solver.as_str()) {
-            solvers.push(&outcome.solver);
-        }
-    }
+    let solvers = distinct(matrix.results.iter().map(|outcome| outcome.solver.as_str()));
     let head: Vec<&str> = ["case", "what"].into_iter().chain(solvers.iter().copied()).collect();
     let mut rows = DocTable { class: "matrix", ..DocTable::new("", 2, &head) };
     for case in &matrix.cases {
