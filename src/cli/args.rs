@@ -29,7 +29,7 @@ Examples:
 /// A laboratory for 2D contact solvers: how fast are they, and how wrong?
 ///
 /// Without a command, runs the default study: a solver of every family on scenes that are hard or
-/// whose reference value is known, at lane widths 1, 4, 8 and 16 and up to three budgets each. It prints
+/// whose reference value is known, at lane widths 1, 4, 8 and 16 and up to five budgets each. It prints
 /// the cheapest setting that is good enough on each scene and a ranking, and writes report.html,
 /// tables.txt, study.csv and study.json.
 #[derive(Parser, Debug)]

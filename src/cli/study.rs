@@ -30,7 +30,7 @@ use std::sync::Arc;
 
 /// Examples printed below the help.
 pub const EXAMPLES: &str = "\
-Without budget options, a solver runs on each scene of the default study at up to three settings.
+Without budget options, a solver runs on each scene of the default study at up to five settings.
 They come from a search by errors, with the same rule and effort for all solvers (--thorough
 repeats it). On other scenes it runs at half, once and twice its standard budget. With budget
 options, every combination runs; values that a solver ignores are dropped.

@@ -9,6 +9,7 @@ mod card_house;
 mod chains;
 mod check;
 mod circle_pile;
+pub mod class;
 mod collision;
 mod column;
 mod compounds;
@@ -232,13 +233,13 @@ impl Loaded {
 ///
 /// Errors: a name that is not in [`CATALOG`]; a size that is invalid or out of range.
 pub fn load(name: &str) -> Result<Loaded, Error> {
-    load_with(name, None)
+    load_run(name, None, None, None)
 }
 
 /// As [`load`], with a seed for random scenes. The same seed gives the same scene; other scenes ignore the
 /// seed.
 pub fn load_with_seed(name: &str, seed: u64) -> Result<Loaded, Error> {
-    load_with(name, Some(seed))
+    load_run(name, Some(seed), None, None)
 }
 
 /// The row of a scene's name, and its size.
@@ -253,7 +254,9 @@ fn entry_of(name: &str) -> Result<(&'static Entry, u32), Error> {
     Ok((entry, entry.parse_size(size)?))
 }
 
-fn load_with(name: &str, seed: Option<u64>) -> Result<Loaded, Error> {
+/// As [`load`], for a run of this number of steps and step length `dt` (s), if given. The reference value is the one
+/// for that run.
+pub fn load_run(name: &str, seed: Option<u64>, steps: Option<u32>, dt: Option<f64>) -> Result<Loaded, Error> {
     let (entry, size) = entry_of(name)?;
     let mut scene = match (entry.seeded, seed) {
         (Some(build), Some(seed)) => build(size, seed),
@@ -262,5 +265,7 @@ fn load_with(name: &str, seed: Option<u64>) -> Result<Loaded, Error> {
     if entry.size.is_some() {
         scene.name = format!("{}:{size}", entry.name);
     }
+    (scene.steps, scene.dt) = (steps.unwrap_or(scene.steps), dt.unwrap_or(scene.dt));
+    scene.validate()?;
     Ok(entry.loaded(scene, size))
 }

@@ -12,7 +12,6 @@
 #[doc(hidden)]
 pub mod answer;
 pub mod budget;
-pub mod class;
 pub mod compare;
 #[doc(hidden)]
 pub mod curve;
@@ -45,10 +44,10 @@ use crate::engine::world::{Divergence, Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::metrics::Errors;
 use crate::lab::overrides;
+use crate::lab::scenes::class::SceneClass;
 use crate::lab::scenes::holds::Broken;
 use crate::lab::scenes::{Loaded, Scene};
 use crate::lab::trial::{Trial, TrialOutcome};
-use class::SceneClass;
 use compare::Ratio;
 use found::{Found, FoundBudgets, TunedBudget};
 use horizon::in_parallel;
@@ -61,7 +60,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use sweep::Swept;
 
 /// Scenes of the default study. Each one shows an effect that the others do not. As many arrive at rest as are
-/// placed there, see [`class::SceneClass`].
+/// placed there, see [`SceneClass`].
 pub const DEFAULT_SCENES: [&str; 14] = [
     "disc_column:10",
     "stack:20",
@@ -417,6 +416,13 @@ fn record_of(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn as_many_scenes_arrive_at_rest_as_are_placed() {
+        let of = |name: &&&str| SceneClass::of(&open_scene(name, None, None, None).unwrap()).unwrap();
+        let count = |class| DEFAULT_SCENES.iter().filter(|name| of(name) == class).count();
+        assert_eq!(SceneClass::ALL.map(count), [5, 5, 4]);
+    }
 
     #[test]
     fn every_solver_of_the_default_list_exists() {

@@ -369,24 +369,7 @@ pub fn open_scene(
         scene.validate()?;
         return scenes::expecting(scene);
     }
-    let mut loaded = match seed {
-        Some(seed) => scenes::load_with_seed(name, seed)?,
-        None => scenes::load(name)?,
-    };
-    let scene = &mut loaded.scene;
-    let (own_steps, own_dt) = (scene.steps, scene.dt);
-    scene.steps = steps.unwrap_or(own_steps);
-    scene.dt = dt.unwrap_or(own_dt);
-    scene.validate()?;
-    let (stem, size) = name.split_once(':').unwrap_or((name, ""));
-    let entry = scenes::CATALOG.iter().find(|e| e.name == stem);
-    match entry {
-        Some(entry) if (scene.steps, scene.dt) != (own_steps, own_dt) => {
-            let size = size.parse().ok().or(entry.size.map(|s| s.default));
-            Ok(entry.loaded(loaded.scene, size.unwrap_or(0)))
-        }
-        _ => Ok(loaded),
-    }
+    scenes::load_run(name, seed, steps, dt)
 }
 
 #[cfg(test)]

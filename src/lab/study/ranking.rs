@@ -12,10 +12,10 @@
 //! [leads](Ranking::leader), by more than a negligible difference of time. The same holds within a class.
 
 use super::Record;
-use super::class::SceneClass;
 use super::compare::TIE;
 use super::curve::solvers_of;
 use super::profile::times_of_fastest;
+use crate::lab::scenes::class::SceneClass;
 use crate::lab::scenes::tolerance::Accuracy;
 
 /// Result of a solver over all scenes.

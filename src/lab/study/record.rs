@@ -1,7 +1,6 @@
 //! Results of a study: one record per setting, and the records on the Pareto fronts.
 
 use super::budget;
-use super::class::SceneClass;
 use super::curve::ErrorAxis;
 use super::pareto::{self, TimeAndError};
 use super::sample::Sample;
@@ -16,6 +15,7 @@ use crate::lab::error::Error;
 use crate::lab::interned::{self, Name};
 use crate::lab::metrics::Errors;
 use crate::lab::overrides;
+use crate::lab::scenes::class::SceneClass;
 use crate::lab::scenes::holds::{Broken, Mark};
 use crate::lab::scenes::tolerance::{Accuracy, Tolerances};
 pub use crate::lab::trial::TruthError;

@@ -68,14 +68,8 @@ pub fn recordings(plan: &StudyPlan, records: &[Record]) -> Result<Vec<Vec<u8>>, 
 }
 
 fn recording(plan: &StudyPlan, record: &Record) -> Result<Vec<u8>, Error> {
-    let mut loaded = None;
-    for given in &plan.scenes {
-        let opened = plan.open(given)?;
-        if opened.scene.name == record.scene {
-            loaded = Some(opened);
-        }
-    }
-    let Some(mut loaded) = loaded else {
+    let mut opened = plan.scenes.iter().filter_map(|name| plan.open(name).ok());
+    let Some(mut loaded) = opened.find(|loaded| loaded.scene.name == record.scene) else {
         return Err(Error::invalid("replay", format!("no run of {} on {}", record.solver, record.scene)));
     };
     let setting = format!("{}, {}", record.budget_text, lanes(record.lanes));
