@@ -14,7 +14,7 @@
 //! rows are in the same vectors, with their bounds instead of cones. If a factor would be larger than
 //! `factor_limit`, ten steps of conjugate gradients replace it.
 //!
-//! **Agreement.** Within 6e-5 of the solution in `f64` (`tests/lab/agree`).
+//! **Agreement.** Within 6e-5 of its source's method in `f64` (`tests/lab/agree`).
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and `velocity_iterations` times 2 passes over contacts, 4 over vectors
 //! and 1 substitution, n b operations for n = 3 rows a body in a band of b; n b²/2 of a factorization, of which a step has 1 to

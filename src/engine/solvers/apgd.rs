@@ -6,7 +6,9 @@
 //! **Departures.** Steps are scaled by each point's effective mass, the same along n and t, so that a cone
 //! stays a cone. L is kept from step to step. The gradient at an
 //! extrapolated point is extrapolated as well, because the problem is linear. Joint rows are in the same
-//! vectors, each scaled by its own mass and projected on its bounds.
+//! vectors, each scaled by its own mass and projected on its bounds. Points bounce by the
+//! law of [`super::pgs`]: the rebound speed is part of b ([`bias`](crate::constraints::impacts::bias)). In Chrono, a
+//! point bounces if its rebound is faster than 0.15 m/s, here if its approach is faster than 1 m/s.
 //!
 //! **Agreement.** Within 6e-5 of its source's method in `f64` (`tests/lab/agree`).
 //!

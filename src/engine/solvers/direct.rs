@@ -8,7 +8,8 @@
 //! therefore solves a proximal problem: ε D (λ − λ₀) is added to the relative velocities, where λ₀ are the
 //! impulses left by the sweeps. This makes the problem definite, and impulses that the law does not determine
 //! stay near λ₀. Joint rows are in the same system: a row holds, or has the impulse at its bound. Overlap is
-//! pushed apart as in [`super::pgs`]. Sweeps of [`super::pgs`] come first. A scene with more than `largest`
+//! pushed apart as in [`super::pgs`], and points bounce as there: their rebound speed is part of the law, as in
+//! Newton's law of impact in `acary2018`. Sweeps of [`super::pgs`] come first. A scene with more than `largest`
 //! points is left to them, and runs and studies report that. Each island has its own line search. If a Newton
 //! step finds no improvement, eight sweeps in `f64` replace it. After nine steps that leave more than half of
 //! the residual, an island of at most 64 points without joints tries Lemke's method. With `lemke` set,

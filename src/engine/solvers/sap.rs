@@ -15,7 +15,7 @@
 //! rows is 10⁻⁸; that of springs follows from their law. Motors and capped springs have the nearest
 //! impulse within their bound, in the norm of their compliance.
 //!
-//! **Agreement.** Within 6e-5 of the solution in `f64` (`tests/lab/agree`).
+//! **Agreement.** Within 6e-5 of its source's method in `f64` (`tests/lab/agree`).
 //!
 //! **Cost.** Per substep 2 body passes and up to `velocity_iterations` Newton steps, each a factorization in `f64`, one
 //! lane: 9 n b² operations for n bodies in a band of b bodies. A step in which nothing changes state takes one or two.

@@ -7,9 +7,10 @@
 //! **Departures.** Each of the two quadratic programs is solved in lanes by spectral projected gradients
 //! ([`spectral`]), for `inner` iterations or until nothing changes; the source uses a dense active-set
 //! method. In 2D a friction cone is an interval and needs no facets. Overlap is pushed apart as in
-//! [`super::pgs`]. Joint rows are in both programs, with their bounds.
+//! [`super::pgs`]. Joint rows are in both programs, with their bounds. Points bounce as in
+//! [`super::pgs`]: their rebound speed is part of b.
 //!
-//! **Agreement.** Within 6e-5 of the solution in `f64` (`tests/lab/agree`).
+//! **Agreement.** Within 6e-5 of its source's method in `f64` (`tests/lab/agree`).
 //!
 //! **Cost.** Per substep 2 body passes, 1 warm start and in each of `velocity_iterations` rounds up to 2 `inner` times 3 passes
 //! over vectors in lanes.

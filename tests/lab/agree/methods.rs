@@ -9,6 +9,7 @@ use simpulse::engine::params::Budget;
 use simpulse::engine::solvers::{Variant, xpbd as displacements};
 use simpulse::lab::reference::oracle::{RowOrder, ScalarSweep};
 use simpulse::lab::reference::{DPair, ProblemBody, Velocity};
+use std::cell::RefCell;
 
 /// Uncorrected overlap (m), push speed limit (m/s), largest correction of a position sweep (m).
 const SLOP: f64 = 0.005;
@@ -16,7 +17,7 @@ pub(super) const CAP: f64 = 3.0;
 const MOST: f64 = 0.2;
 
 /// Parameters of a schedule.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Run {
     /// The solver that is compared.
     pub variant: &'static Variant,
@@ -24,6 +25,34 @@ pub struct Run {
     pub budget: Budget,
     /// Index of the departure to undo.
     pub undo: Option<usize>,
+    /// A mistake to make.
+    pub fault: Option<Fault>,
+    /// What the method keeps from step to step, in addition to impulses.
+    pub kept: RefCell<KeptState>,
+}
+
+/// A mistake in the method in `f64`, which the comparison must detect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// The coupling between points is left out of the linear problem.
+    Uncoupled,
+    /// Every step of a descent is as long as the first.
+    FixedLength,
+    /// Half of the impulses are stored for the next step.
+    HalfStored,
+    /// Anchors of friction are forgotten between steps.
+    NoAnchors,
+    /// Rebounds have the wrong sign.
+    Inward,
+}
+
+/// What a method keeps from step to step.
+#[derive(Clone, Debug, Default)]
+pub struct KeptState {
+    /// How far each point has drifted since it began to stick (m).
+    pub drifts: Vec<f64>,
+    /// L of `apgd` (1).
+    pub steepness: f64,
 }
 
 impl Run {
@@ -40,6 +69,11 @@ impl Run {
     /// Whether departure `place` is undone.
     pub fn undoes(&self, place: usize) -> bool {
         self.undo == Some(place)
+    }
+
+    /// Whether it makes this mistake.
+    pub fn makes(&self, fault: Fault) -> bool {
+        self.fault == Some(fault)
     }
 
     pub fn baumgarte(&self) -> ScalarRule {
@@ -64,9 +98,19 @@ fn substeps(
     for _ in 0..run.budget.substeps {
         model.accelerate();
         model.warm_start(turned);
-        (0..run.budget.velocity_iterations).for_each(|_| solve(model));
+        for _ in 0..run.budget.velocity_iterations {
+            solve(model);
+            rebound(model);
+        }
         model.advance();
         after(model);
+    }
+}
+
+/// The rows of points that bounce, after a sweep over the others (`catto2007box2d`).
+pub(super) fn rebound(model: &mut Model) {
+    for i in (0..model.l.len()).filter(|&i| model.problem.contacts.get(i).is_some_and(|c| c.rebound != 0.0)) {
+        model.normal_row(i, &ScalarSweep::new(ScalarRule::Rebound));
     }
 }
 
@@ -109,15 +153,15 @@ pub fn against(solver: &str) -> Option<Against> {
         "symmetric_gs" => Method(symmetric),
         "sor" => Method(sor),
         "local_gs" => Method(local),
-        "nsgs" => Method(|m, r| {
-            sweeps(m, r, ScalarSweep { rows: RowOrder::Cone, ..ScalarSweep::new(r.baumgarte()) })
-        }),
+        "nsgs" => Method(nsgs),
         "nncg" => Method(vectors::nncg),
         "anderson" => Method(vectors::anderson),
         "apgd" => Method(vectors::apgd),
-        "barzilai_borwein" => Solution(vectors::apgd),
-        "random_order" | "staggered" | "admm" | "direct" => Solution(solution),
-        "sap" => Solution(vectors::sap),
+        "barzilai_borwein" => Method(vectors::barzilai_borwein),
+        "staggered" => Method(vectors::staggered),
+        "admm" => Method(vectors::admm),
+        "sap" => Method(vectors::sap),
+        "random_order" | "direct" => Solution(solution),
         "shock" => Method(shock),
         "split_impulse" => Method(split_impulse),
         "jacobi" => Method(|m, r| all_at_once(m, r, false)),
@@ -139,6 +183,19 @@ pub fn against(solver: &str) -> Option<Against> {
     })
 }
 
+/// A point that bounces has a given load in the sweep, and its friction row alone is solved.
+fn nsgs(model: &mut Model, run: &Run) {
+    let sweep = ScalarSweep::new(run.baumgarte());
+    let solve = |m: &mut Model| {
+        for range in m.manifolds.clone() {
+            let bounces = m.problem.contacts[range.clone()].iter().any(|c| c.rebound != 0.0);
+            let rows = if bounces { RowOrder::NormalsFirst } else { RowOrder::Cone };
+            m.contact(range, &ScalarSweep { rows, ..sweep });
+        }
+    };
+    substeps(model, run, false, solve, |_| ());
+}
+
 fn pgs(model: &mut Model, run: &Run) {
     let mut sweep = ScalarSweep::new(run.baumgarte());
     match run.undo {
@@ -156,7 +213,7 @@ fn pgs_substeps(model: &mut Model, run: &Run) {
         return pgs(model, run);
     }
     let budget = Budget { position_iterations: 1, ..run.budget };
-    xpbd(model, &Run { variant: &displacements::SOLVER, undo: None, budget });
+    xpbd(model, &Run { variant: &displacements::SOLVER, undo: None, budget, ..run.clone() });
 }
 
 fn sor(model: &mut Model, run: &Run) {
@@ -215,13 +272,17 @@ fn shock(model: &mut Model, run: &Run) {
     for _ in 0..run.budget.substeps {
         model.accelerate();
         model.warm_start(false);
-        (0..run.budget.velocity_iterations).for_each(|_| model.sweep_in(&sweep, order.iter().copied()));
+        for _ in 0..run.budget.velocity_iterations {
+            model.sweep_in(&sweep, order.iter().copied());
+            rebound(model);
+        }
         for of_level in order.chunk_by(|&i, &j| of[i] == of[j]) {
             let here = of[of_level[0]];
             for (b, m) in model.inverse.iter_mut().enumerate() {
                 *m = if level[b] < here { [0.0; 3] } else { inverse[b] };
             }
             model.sweep_in(&sweep, of_level.iter().copied());
+            rebound(model);
         }
         model.inverse.clone_from(&inverse);
         model.advance();
@@ -331,8 +392,8 @@ fn split_impulse(model: &mut Model, run: &Run) {
 }
 
 fn tgs_sticky(model: &mut Model, run: &Run) {
-    let points = model.l.len();
-    let mut drifts = vec![0.0; points];
+    let drifts = &mut run.kept.borrow_mut().drifts;
+    drifts.resize(model.l.len(), 0.0);
     model.l.fill([0.0; 2]);
     let turned = run.undoes(2);
     let mut sweep = |m: &mut Model, fraction: f64, stick: f64| {
@@ -368,15 +429,28 @@ fn tgs_sticky(model: &mut Model, run: &Run) {
             (0..run.budget.relax_iterations).for_each(|_| sweep(model, 0.0, 0.0));
         }
     }
+    book_drifts(model, drifts, 2.0 * SLOP, |_| false);
+}
+
+/// Adds the drifts of the step, and forgets those of points that slide or are not within `reach` (m).
+fn book_drifts(model: &Model, drifts: &mut [f64], reach: f64, slides: impl Fn(usize) -> bool) {
+    for (i, drift) in drifts.iter_mut().enumerate() {
+        let [s, moved] = model.place(i);
+        *drift = if s < reach && !slides(i) { *drift + moved } else { 0.0 };
+    }
 }
 
 fn physx(model: &mut Model, run: &Run) {
     let substeps = run.budget.substeps;
     let fraction = run.get("baumgarte").min(2.0 / f64::from(substeps).sqrt());
+    let drifts = &mut run.kept.borrow_mut().drifts;
+    drifts.resize(model.l.len(), 0.0);
+    // Manifolds that slid at one of their points in the last sweep.
+    let mut slid = vec![false; model.l.len()];
     model.l.fill([0.0; 2]);
-    let sweep = |m: &mut Model, relaxing: bool| {
+    let mut sweep = |m: &mut Model, relaxing: bool| {
         for range in m.manifolds.clone() {
-            for i in range.clone() {
+            for i in range.clone().filter(|&i| m.problem.contacts[i].rebound == 0.0) {
                 let (rows, s) = (m.rows(i, false), m.place(i)[0]);
                 let s = if relaxing { s.max(0.0) } else { s };
                 let began_apart = m.problem.contacts[i].gap > 0.0;
@@ -387,15 +461,20 @@ fn physx(model: &mut Model, run: &Run) {
             }
             let total: f64 = range.clone().map(|i| m.l[i][0]).sum();
             let share = range.len() as f64;
-            for i in range {
+            slid[range.clone()].fill(false);
+            for i in range.clone() {
                 let (rows, [s, drift]) = (m.rows(i, false), m.place(i));
-                let back = if s < 8.0 * SLOP { fraction * drift / m.h } else { 0.0 };
+                let back = if s < 8.0 * SLOP { fraction * (drifts[i] + drift) / m.h } else { 0.0 };
                 let bound = m.problem.contacts[i].friction * total / share;
                 let wanted = m.l[i][1] - fraction * m.mass(&rows, 1) * (m.speed(&rows, 1) + back);
                 let new = wanted.clamp(-bound, bound);
                 m.set(i, 1, &rows, new);
+                if wanted.abs() > bound {
+                    slid[range.clone()].fill(true);
+                }
             }
         }
+        rebound(m);
     };
     for substep in 0..substeps {
         match run.undoes(0) {
@@ -407,6 +486,7 @@ fn physx(model: &mut Model, run: &Run) {
         model.advance();
     }
     (0..run.budget.relax_iterations).for_each(|_| sweep(model, true));
+    book_drifts(model, drifts, 8.0 * SLOP, |i| slid[i]);
 }
 
 fn jolt(model: &mut Model, run: &Run) {
@@ -597,5 +677,5 @@ fn avbd(model: &mut Model, run: &Run) {
 /// The solution of the law of [`pgs`], to which Gauss–Seidel converges.
 fn solution(model: &mut Model, run: &Run) {
     let budget = Budget { velocity_iterations: 5000, ..run.budget };
-    pgs(model, &Run { budget, undo: None, ..*run });
+    pgs(model, &Run { budget, undo: None, ..run.clone() });
 }

@@ -12,7 +12,8 @@
 //!
 //! over iterations and problems, where t is the elapsed time. The method in `f64` also makes the solver's
 //! departures from its source. Each departure is undone alone, to measure how much it changes the result. The
-//! problems are small and resemble piles in the middle of a step that is not at rest: gaps and overlaps, one
+//! net impulses of the bodies, M⁻¹ Jᵀ λ, are compared as velocities are; impulses of single points are left out
+//! where the solution does not determine them. The problems are small and resemble piles in the middle of a step that is not at rest: gaps and overlaps, one
 //! of them deep, and loads that are only roughly right.
 //!
 //! `cargo test --release --test lab agree -- --nocapture` prints each solver's source, settings, distance and
@@ -20,9 +21,10 @@
 
 mod methods;
 mod rules;
+mod stories;
 mod vectors;
 
-use methods::{Against, Run, against};
+use methods::{Against, Fault, KeptState, Run, against};
 use simpulse::engine::constraints::records::kept::KeptSize;
 use simpulse::engine::params::{Budget, Without};
 use simpulse::engine::solvers::{VARIANTS, Variant, find};
@@ -60,8 +62,9 @@ fn source(solver: &str) -> (&'static str, Vec<&'static str>, &'static str) {
 struct Agreement {
     variant: &'static Variant,
     against: Against,
-    /// Largest distance (1).
+    /// Largest distance in the problems, and in each story (1).
     apart: f64,
+    stories: Vec<f64>,
     /// Distance between the methods in `f64` with and without each departure (1).
     departures: Vec<f64>,
 }
@@ -95,8 +98,14 @@ fn problems() -> [ContactProblem; 3] {
     })
 }
 
-/// Compares one solver.
-fn agreement(variant: &'static Variant) -> Agreement {
+/// Mechanisms of a solver that are left out in the comparison.
+fn left_out(variant: &Variant) -> Without {
+    let names = WITHOUT.iter().filter(|_| variant.name == "shim");
+    names.map(|name| variant.mechanism(name).unwrap()).fold(Without::default(), Without::and)
+}
+
+/// Compares one solver with its method, which makes the mistake `fault`.
+fn agreement(variant: &'static Variant, fault: Option<Fault>) -> Agreement {
     let against = against(variant.name).unwrap_or_else(|| panic!("no method for {}", variant.name));
     let (method, counts) = match against {
         Against::Method(method) => (method, (1..=COUNT).collect::<Vec<_>>()),
@@ -106,34 +115,33 @@ fn agreement(variant: &'static Variant) -> Agreement {
         true => Budget { substeps: k, ..variant.budget },
         false => variant.of_iterations(k),
     };
-    let left_out =
-        WITHOUT.iter().filter(|_| variant.name == "shim").map(|name| variant.mechanism(name).unwrap());
-    let without = left_out.fold(Without::default(), Without::and);
     // Solvers with internal state start without any.
     let warm = variant.kept == KeptSize::NONE;
     let (mut apart, mut departures) = (0.0, vec![0.0; source(variant.name).1.len()]);
     for problem in problems() {
-        let mut replay = Replay::in_substeps(&problem, variant.defaults(), without).unwrap();
+        let mut replay = Replay::in_substeps(&problem, variant.defaults(), left_out(variant)).unwrap();
         let there = |k: u32, undo: Option<usize>| {
             let start = if warm { problem.warm_impulses() } else { problem.no_impulses() };
             let mut model = Model::new(&problem, Target::Rigid, start);
-            method(&mut model, &Run { variant, budget: budget(k), undo });
+            method(
+                &mut model,
+                &Run { variant, budget: budget(k), undo, fault, kept: KeptState::default().into() },
+            );
             ModelState { v: model.v, x: model.x, l: model.l }
         };
+        let determined = determined(&problem, variant.name, against);
         for &k in &counts {
             let here = replay.run(variant, budget(k), if warm { Start::Warm } else { Start::Cold });
             let (source, time) = (there(k, None), problem.h * f64::from(budget(k).substeps));
             for (place, most) in departures.iter_mut().enumerate() {
-                *most = worse(*most, distance(&problem, time, &there(k, Some(place)), &source));
+                *most = worse(*most, distance(&problem, time, &there(k, Some(place)), &source, &determined));
             }
-            // At the solution, multipliers of redundant contacts are not determined.
-            let is_solution = matches!(against, Against::Solution(_));
-            let l = if is_solution { source.l.clone() } else { here.impulses };
-            let here = ModelState { v: here.velocities, x: here.moves, l };
-            apart = worse(apart, distance(&problem, time, &here, &source));
+            let here = ModelState { v: here.velocities, x: here.moves, l: here.impulses };
+            apart = worse(apart, distance(&problem, time, &here, &source, &determined));
         }
     }
-    Agreement { variant, against, apart, departures }
+    let stories = stories::ALL.iter().map(|story| story.apart(variant, fault)).collect();
+    Agreement { variant, against, apart, stories, departures }
 }
 
 /// The larger of the two; NaN counts as larger.
@@ -141,16 +149,61 @@ fn worse(a: f64, b: f64) -> f64 {
     if b > a || b.is_nan() { b } else { a }
 }
 
+/// For each impulse, whether its value can be compared. A method determines all; a solution those of rows of J
+/// that are no combination of the others: by Gram–Schmidt in the mass norm.
+fn determined(problem: &ContactProblem, solver: &str, against: Against) -> Vec<[bool; 2]> {
+    // Impulses of `sap` are nearly undetermined: 10⁵ times the rounding of the rows.
+    if matches!(against, Against::Method(_)) && solver != "sap" {
+        return vec![[true; 2]; problem.unknowns()];
+    }
+    let row = |at: usize| {
+        let mut unit = problem.no_impulses();
+        unit[at / 2][at % 2] = 1.0;
+        let pushed = minus(&problem.velocities(&unit), &problem.velocities(&problem.no_impulses()));
+        let masses = problem.bodies.iter().map(|b| b.inverse().map(|i| if i > 0.0 { i.sqrt() } else { 1.0 }));
+        pushed.iter().zip(masses).flat_map(|(v, m)| [0, 1, 2].map(|k| v[k] / m[k])).collect::<Vec<f64>>()
+    };
+    let rows: Vec<Vec<f64>> = (0..2 * problem.unknowns()).map(row).collect();
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let is_new = |basis: &[Vec<f64>], row: &[f64]| {
+        let mut rest = row.to_vec();
+        for _ in 0..2 {
+            for q in basis {
+                let part = dot(q, &rest);
+                rest.iter_mut().zip(q).for_each(|(x, q)| *x -= part * q);
+            }
+        }
+        let size = dot(&rest, &rest).sqrt();
+        (size > 1e-6 * dot(row, row).sqrt()).then(|| rest.iter().map(|x| x / size).collect::<Vec<f64>>())
+    };
+    let alone = |at: usize| {
+        let mut basis: Vec<Vec<f64>> = Vec::new();
+        for other in (0..rows.len()).filter(|&other| other != at) {
+            basis.extend(is_new(&basis, &rows[other]));
+        }
+        is_new(&basis, &rows[at]).is_some()
+    };
+    (0..problem.unknowns()).map(|i| [alone(2 * i), alone(2 * i + 1)]).collect()
+}
+
 /// The distance of two states after `time` (s), see the [module](self).
-fn distance(problem: &ContactProblem, time: f64, one: &ModelState, other: &ModelState) -> f64 {
+fn distance(
+    problem: &ContactProblem,
+    time: f64,
+    one: &ModelState,
+    other: &ModelState,
+    determined: &[[bool; 2]],
+) -> f64 {
     let free: Vec<Velocity> = problem.bodies.iter().map(|b| b.free_velocity).collect();
     let scale = problem.mass_norm(&minus(&other.v, &free)).max(problem.mass_norm(&free));
     let largest = other.l.iter().flatten().fold(problem.impulse_unit(), |m, l| m.max(l.abs()));
-    let impulses = one.l.iter().flatten().zip(other.l.iter().flatten());
+    let impulses = one.l.iter().flatten().zip(other.l.iter().flatten()).zip(determined.iter().flatten());
+    let pushed = minus(&problem.velocities(&one.l), &problem.velocities(&other.l));
     let parts = [
         problem.mass_norm(&minus(&one.v, &other.v)) / scale,
         problem.mass_norm(&minus(&one.x, &other.x)) / (time * scale),
-        impulses.map(|(a, b)| (a - b).abs()).fold(0.0, worse) / largest,
+        problem.mass_norm(&pushed) / scale,
+        impulses.filter(|(_, is)| **is).map(|((a, b), _)| (a - b).abs()).fold(0.0, worse) / largest,
     ];
     parts.into_iter().fold(0.0, worse)
 }
@@ -177,7 +230,7 @@ fn settings(variant: &Variant) -> String {
 impl Agreement {
     /// What the docs of the solver leave to this test.
     fn text(&self) -> String {
-        let Agreement { variant, against, apart, departures } = self;
+        let Agreement { variant, against, apart, stories, departures } = self;
         let (best, departs, why) = source(variant.name);
         let of = match (against, variant.budget.substeps > 1) {
             (Against::Solution(_), _) => format!("the solution in f64 after {MANY} iterations ({why})"),
@@ -187,6 +240,9 @@ impl Agreement {
         let (name, key, ours) = (variant.name, variant.source, settings(variant));
         let mut out = format!("{name}: {apart:.1e} from {of}, {ROUNDING:.0e} allowed\n");
         out += &format!("  source [{key}] at its best: {best}\n  here: {ours}\n");
+        for (story, apart) in stories::ALL.iter().zip(stories) {
+            out += &format!("  {apart:.1e} in the story of {}\n", story.name);
+        }
         for (what, apart) in departs.iter().zip(departures) {
             out += &format!("  departs by {:>6.1} %: {what}\n", 100.0 * apart);
         }
@@ -201,10 +257,12 @@ fn solvers_agree_with_their_sources() {
     let rows = include_str!("sources.md").lines().filter(|line| line.starts_with("| `")).count();
     assert_eq!(rows, VARIANTS.len(), "rows of tests/lab/agree/sources.md");
     for variant in &VARIANTS {
-        let a = agreement(variant);
+        let a = agreement(variant, None);
         println!("{}", a.text());
-        if a.apart.is_nan() || a.apart > ROUNDING {
-            wrong += &format!("{} is {:.1e} apart, {ROUNDING:.0e} allowed\n", variant.name, a.apart);
+        let parts = [a.apart].into_iter().chain(a.stories.iter().copied());
+        if parts.clone().any(|apart| apart.is_nan() || apart > ROUNDING) {
+            let parts: Vec<String> = parts.map(|apart| format!("{apart:.1e}")).collect();
+            wrong += &format!("{} is {} apart, {ROUNDING:.0e} allowed\n", variant.name, parts.join(", "));
         }
         let of = if matches!(a.against, Against::Method(_)) { "its source's method" } else { "the solution" };
         let line = format!("//! **Agreement.** Within {ROUNDING:.0e} of {of} in `f64` (`tests/lab/agree`).");
@@ -219,6 +277,23 @@ fn solvers_agree_with_their_sources() {
 /// A difference in method is detected: a departure undone.
 #[test]
 fn a_departure_shows() {
-    let pgs = agreement(find("pgs").unwrap());
+    let pgs = agreement(find("pgs").unwrap(), None);
     assert!(pgs.departures.iter().all(|apart| *apart > 100.0 * ROUNDING), "{:?}", pgs.departures);
+}
+
+/// Each mistake, made by the method in `f64`, is detected.
+#[test]
+fn a_mistake_shows() {
+    for (fault, solver) in [
+        (Fault::Uncoupled, "admm"),
+        (Fault::FixedLength, "barzilai_borwein"),
+        (Fault::HalfStored, "pgs"),
+        (Fault::NoAnchors, "physx"),
+        (Fault::Inward, "staggered"),
+    ] {
+        let a = agreement(find(solver).unwrap(), Some(fault));
+        let apart = a.stories.iter().copied().fold(a.apart, worse);
+        println!("{fault:?} in {solver}: {apart:.1e}");
+        assert!(apart > 100.0 * ROUNDING, "{fault:?} in {solver}: {apart:.1e}");
+    }
 }

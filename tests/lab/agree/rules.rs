@@ -21,6 +21,8 @@ pub enum ScalarRule {
     Shallow(f64, f64),
     /// Corrects the fraction β of an overlap larger than a limit (m); shallower points have no row.
     Deep(f64, f64),
+    /// The target of a point that bounces, v_n ≥ u; other rules leave its row alone.
+    Rebound,
     /// v_n ≥ 0 at points with a gap below a slop (m); other points have no row.
     Touching(f64),
 }
@@ -58,7 +60,10 @@ fn against_static(model: &Model, i: usize) -> bool {
 impl GapRule for ScalarRule {
     fn line(self, model: &Model, i: usize) -> Line {
         let (s, h, rigid) = (model.place(i)[0], model.h, Line::rigid);
+        let u = model.problem.contacts[i].rebound;
         match self {
+            ScalarRule::Rebound => rigid(-u),
+            _ if u != 0.0 => Line { scale: 0.0, ..rigid(0.0) },
             ScalarRule::Closed => rigid(0.0),
             ScalarRule::Touching(slop) => Line { scale: if s < slop { 1.0 } else { 0.0 }, ..rigid(0.0) },
             ScalarRule::Deep(share, limit) if s < -limit => rigid(share * s / h),
