@@ -258,7 +258,7 @@ impl SettingArgs {
         })
     }
 
-    /// The solver with its budget, parameters and treatment of impacts. Errors: as [`Self::budget`] and
+    /// The solver with its budget, parameters, mechanisms and treatments of impacts and frozen contacts. Errors: as [`Self::budget`] and
     /// [`Self::parameters`].
     pub fn settings(&self) -> Result<Settings, Error> {
         let (budget, parameters) = (self.budget()?, self.parameters()?);

@@ -13,7 +13,7 @@ use crate::lab::scenes::tolerance::Accuracy;
 use crate::lab::study::answer::{Answer, each_setting, fails_last, order};
 use crate::lab::study::compare::Ratio;
 use crate::lab::study::curve::{ErrorAxis, solvers_of};
-use crate::lab::study::ranking::{Ranking, Standing, ranking};
+use crate::lab::study::ranking::{FirstPlaces, Ranking, Standing, ranking};
 use crate::lab::study::{self, Record};
 
 const MOST_RANKED: usize = 8;
@@ -88,7 +88,7 @@ fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> Strin
                 speed(only)
             );
         }
-        (None, _) if ranking.first.is_empty() => text += "No setting is good enough on any scene.",
+        (None, _) if ranking.first.solvers.is_empty() => text += "No setting is good enough on any scene.",
         (None, []) => text += "No solver is good enough on all scenes: choose by scene.",
         (None, several) => {
             text += &format!(
@@ -97,18 +97,18 @@ fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> Strin
             );
         }
     }
-    if ranking.leader().is_none() && ranking.first.len() > 1 {
+    if ranking.leader().is_none() && ranking.first.solvers.len() > 1 {
         text += &format!(
-            "  By speed there is no clear leader: with a scene or class left out or other tolerances, first is one of {}.",
-            short_list(&ranking.first, 6)
+            "  By speed there is no clear leader: with a scene or class left out or other tolerances, first is {}.",
+            first_places(&ranking.first, 6)
         );
     }
     let words = ["stay where they are placed at rest", "arrive at rest", "need not come to rest"];
-    let classes = words.iter().zip(&ranking.first_in).filter(|(_, first)| !first.is_empty());
+    let classes = words.iter().zip(&ranking.first_in).filter(|(_, first)| !first.solvers.is_empty());
     let classes: Vec<String> = classes
-        .map(|(words, first)| match &first[..] {
-            [only] => format!("{only} leads where bodies {words}"),
-            several => format!("one of {} where they {words}", short_list(several, 3)),
+        .map(|(words, first)| match &first.solvers[..] {
+            [(only, _)] => format!("{only} leads where bodies {words}"),
+            _ => format!("{} where they {words}", first_places(first, 3)),
         })
         .collect();
     if classes.len() > 1 {
@@ -128,6 +128,15 @@ fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> Strin
         );
     }
     text + "\n"
+}
+
+/// `a in 9 of 12, b in 4`: first places, which may be shared.
+fn first_places(first: &FirstPlaces, most: usize) -> String {
+    let place = |(i, (solver, count)): (usize, &(&str, usize))| match i {
+        0 => format!("{solver} in {count} of {}", first.variations),
+        _ => format!("{solver} in {count}"),
+    };
+    short_list(&first.solvers.iter().enumerate().map(place).collect::<Vec<_>>(), most)
 }
 
 /// The first few of a list.
@@ -508,7 +517,7 @@ mod tests {
         let text = page(&torn);
         assert!(
             text.starts_with("2 solvers are good enough on all scenes")
-                && text.replace('\n', " ").contains("first is one of soft_step, shim"),
+                && text.replace('\n', " ").contains("first is soft_step in 4 of 5, shim in 1"),
             "{text}"
         );
     }

@@ -214,51 +214,43 @@ pub fn frozen_table(records: &[Record]) -> Option<DocTable> {
 /// Such a table; a line per solver and value. Scenes on which a solver ran with one value only are left out.
 fn treatments(name: &str, records: &[Record], of: impl Fn(&Record) -> String) -> Option<DocTable> {
     let caption = format!(
-        "What {name} gain and cost: scenes on which the solver is good enough, and on which it is so (+) or not (−) only \
-         with them; time: of its cheapest good setting over that of its first line, geometric mean"
+        "What {name} gain and cost: numbers of scenes on which a setting of the solver holds, is plausible and tight; time \
+         of its cheapest plausible setting over that of its first line, geometric mean; scenes that are better (+) or \
+         worse (−) than in its first line"
     );
-    let mut rows = DocTable {
-        wide: true,
-        ..DocTable::new(caption, 2, &["solver", name, "plausible", "tight", "time", "+", "−"])
-    };
+    let head = ["solver", name, "holds", "plausible", "tight", "time", "+", "−"];
+    let mut rows = DocTable { wide: true, ..DocTable::new(caption, 2, &head) };
     for solver in solvers_of(records) {
-        let own = |r: &&Record| r.solver == solver;
-        let values_of = |records: &[Record]| distinct(records.iter().filter(own).map(&of));
-        let values = values_of(records);
+        let values_of = |records: &[Record]| distinct(records.iter().filter(|r| r.solver == solver).map(&of));
         let scenes: Vec<&[Record]> =
             records.chunk_by(|a, b| a.scene == b.scene).filter(|scene| values_of(scene).len() > 1).collect();
-        let Some(first) = values.first().filter(|_| !scenes.is_empty()) else { continue };
-        // The time of the cheapest setting that is good enough (ns), infinite without one.
-        let best = |scene: &[Record], value: &String, accuracy: Accuracy| {
-            let good = scene.iter().filter(own).filter(|r| of(r) == *value && r.is_good(accuracy));
-            good.map(Record::cost_ns).fold(f64::INFINITY, f64::min)
+        let values = values_of(records);
+        let is_own = |r: &Record, value: &String| r.solver == solver && of(r) == *value;
+        let level = |scene: &[Record], value: &String| {
+            let good = |r: &Record| [Accuracy::Plausible, Accuracy::Tight].map(|a| usize::from(r.is_good(a)));
+            let level = |r: &Record| usize::from(r.holds()) + good(r).into_iter().sum::<usize>();
+            scene.iter().filter(|r| is_own(r, value)).map(level).max().unwrap_or(0)
         };
-        for value in &values {
-            let count = |accuracy| scenes.iter().filter(|s| best(s, value, accuracy).is_finite()).count();
-            let pairs: Vec<(&str, [f64; 2])> = scenes
-                .iter()
-                .map(|s| (s[0].scene.as_str(), [first, value].map(|v| best(s, v, Accuracy::Plausible))))
-                .collect();
-            let names = |own: usize| {
-                let only = pairs.iter().filter(|p| p.1[own].is_finite() && p.1[1 - own].is_infinite());
-                only.map(|p| p.0).collect::<Vec<_>>().join(", ")
+        for value in values.iter().filter(|_| !scenes.is_empty()) {
+            let levels: Vec<[usize; 2]> =
+                scenes.iter().map(|s| [value, &values[0]].map(|v| level(s, v))).collect();
+            let count = |least: usize| {
+                format!("{} of {}", levels.iter().filter(|l| l[0] >= least).count(), scenes.len())
             };
-            let logs: Vec<f64> =
-                pairs.iter().map(|p| (p.1[1] / p.1[0]).ln()).filter(|log| log.is_finite()).collect();
-            let time = (logs.iter().sum::<f64>() / logs.len() as f64).exp();
-            let of_scenes = |n: usize| format!("{n} of {}", scenes.len());
-            let time = if time.is_finite() { format!("{time:.2}") } else { "–".into() };
-            let cells = [
-                value.clone(),
-                of_scenes(count(Accuracy::Plausible)),
-                of_scenes(count(Accuracy::Tight)),
-                time,
-            ];
-            rows.row(
-                [DocCell::solver(solver)]
-                    .into_iter()
-                    .chain(cells.into_iter().chain([names(1), names(0)]).map(DocCell::from)),
-            );
+            let names = |better: bool| {
+                let chosen = scenes.iter().zip(&levels).filter(|(_, [a, b])| a != b && (a > b) == better);
+                chosen.map(|(s, _)| s[0].scene.as_str()).collect::<Vec<_>>().join(", ")
+            };
+            let time = |scene: &[Record], value: &String| {
+                let good = scene.iter().filter(|r| is_own(r, value) && r.is_good(Accuracy::Plausible));
+                good.map(Record::cost_ns).fold(f64::INFINITY, f64::min)
+            };
+            let logs = scenes.iter().map(|s| (time(s, value) / time(s, &values[0])).ln());
+            let logs: Vec<f64> = logs.filter(|log| log.is_finite()).collect();
+            let mean = (logs.iter().sum::<f64>() / logs.len() as f64).exp();
+            let mean = if mean.is_finite() { format!("{mean:.2}") } else { "–".into() };
+            let cells = [value.clone(), count(1), count(2), count(3), mean, names(true), names(false)];
+            rows.row(std::iter::once(DocCell::solver(solver)).chain(cells.map(DocCell::from)));
         }
     }
     (!rows.rows.is_empty()).then_some(rows)
@@ -377,8 +369,8 @@ mod tests {
         let line = |start: &str| {
             text.lines().find(|l| l.contains(start)).unwrap().split_whitespace().collect::<Vec<_>>().join(" ")
         };
-        assert_eq!(line(" fresh"), "pgs fresh 1 of 2 1 of 2 1.00");
-        assert_eq!(line(" own"), "pgs own 2 of 2 1 of 2 1.50 x");
+        assert_eq!(line(" fresh"), "pgs fresh 1 of 2 1 of 2 1 of 2 1.00");
+        assert_eq!(line(" own"), "pgs own 2 of 2 2 of 2 1 of 2 1.50 x");
         assert!(treatment_tables(&records[..1]).is_empty());
     }
 

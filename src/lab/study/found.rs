@@ -137,7 +137,7 @@ mod tests {
     use crate::lab::study::{DEFAULT_SCENES, DEFAULT_SOLVERS, budget, open_scene};
 
     /// Scenes that were not searched for every solver of the crate, because that takes too long.
-    const LARGE: [&str; 2] = ["pyramid:30", "circle_pile:500"];
+    const LARGE: [&str; 3] = ["pyramid:30", "circle_pile:500", "high_mass_ratio_1"];
 
     #[test]
     fn the_shipped_list_has_every_solver_on_the_scenes_of_the_study() {

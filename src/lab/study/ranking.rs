@@ -13,7 +13,7 @@
 
 use super::Record;
 use super::compare::TIE;
-use super::curve::solvers_of;
+use super::curve::{distinct, solvers_of};
 use super::profile::times_of_fastest;
 use crate::lab::scenes::class::SceneClass;
 use crate::lab::scenes::tolerance::Accuracy;
@@ -42,17 +42,26 @@ pub struct Standing {
 pub struct Ranking {
     /// Sorted by score, the best first; equal ones by name.
     pub standings: Vec<Standing>,
-    /// Solvers that are first in some variation: with any scene or class left out, or with half or twice the
-    /// tolerances. Sorted by score.
-    pub first: Vec<&'static str>,
-    /// The same on the scenes of each class alone. Empty without scenes of the class.
-    pub first_in: [Vec<&'static str>; 3],
+    /// Solvers that are first in some variation: with no scene, any scene or any class left out, or with half or twice
+    /// the tolerances.
+    pub first: FirstPlaces,
+    /// The same on the scenes of each class alone.
+    pub first_in: [FirstPlaces; 3],
+}
+
+/// First places of solvers in variations of a ranking; solvers may share one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FirstPlaces {
+    /// Solvers with the number of their first places, the most first.
+    pub solvers: Vec<(&'static str, usize)>,
+    /// Number of variations.
+    pub variations: usize,
 }
 
 impl Ranking {
     /// The solver that is first in every variation; `None` if that depends on the variation.
     pub fn leader(&self) -> Option<&Standing> {
-        let [only] = self.first[..] else { return None };
+        let [(only, _)] = self.first.solvers[..] else { return None };
         self.standings.first().filter(|s| s.solver == only && s.score > 0.0)
     }
 }
@@ -83,7 +92,8 @@ fn scores(scenes: &[&SceneSpeeds], at: usize, keep: impl Fn(&[Record]) -> bool) 
 fn variations(scenes: &[&SceneSpeeds]) -> Vec<Vec<f64>> {
     let mut tried: Vec<Vec<f64>> = (0..=FACTORS.len()).map(|at| scores(scenes, at, |_| true)).collect();
     tried.extend(scenes.iter().map(|out| scores(scenes, 0, |own| own[0].scene != out.0[0].scene)));
-    tried.extend(SceneClass::ALL.map(|out| scores(scenes, 0, |own| own[0].class != out)));
+    let classes = distinct(scenes.iter().map(|s| s.0[0].class));
+    tried.extend(classes.into_iter().map(|out| scores(scenes, 0, |own| own[0].class != out)));
     tried.retain(|scores| !scores.is_empty());
     tried
 }
@@ -119,16 +129,17 @@ pub fn ranking(records: &[Record]) -> Ranking {
     };
     let mut standings: Vec<Standing> = solvers.iter().enumerate().map(standing).collect();
     standings.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.solver.cmp(b.solver)));
-    let names = |tried: &[Vec<f64>]| -> Vec<&'static str> {
-        let is_first = |solver: &&'static str| {
-            let best = |t: &[f64]| t.iter().copied().fold(0.0, f64::max);
-            let place = solvers.iter().position(|s| s == solver);
-            // Solvers that share first place all count; so do those behind by a difference that is no verdict.
-            place.is_some_and(|k| tried.iter().any(|t| t[k] > 0.0 && t[k] * (1.0 + TIE) >= best(t)))
-        };
-        standings.iter().map(|s| s.solver).filter(is_first).collect()
+    // Solvers that share first place all count; so do those behind by a difference that is no verdict.
+    let places = |tried: &Vec<Vec<f64>>| {
+        let is_first =
+            |t: &Vec<f64>, k: usize| t[k] > 0.0 && t.iter().all(|other| t[k] * (1.0 + TIE) >= *other);
+        let count = |k: usize| tried.iter().filter(|t| is_first(t, k)).count();
+        let own = |s: &Standing| Some((s.solver, count(solvers.iter().position(|name| *name == s.solver)?)));
+        let mut solvers: Vec<_> = standings.iter().filter_map(own).filter(|(_, count)| *count > 0).collect();
+        solvers.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+        FirstPlaces { solvers, variations: tried.len() }
     };
-    let (first, first_in) = (names(&tried), tried_in.each_ref().map(|tried| names(tried)));
+    let (first, first_in) = (places(&tried), tried_in.each_ref().map(places));
     Ranking { standings, first, first_in }
 }
 
@@ -168,7 +179,8 @@ mod tests {
         // Without x b scores a third of its tie, without z or w two thirds.
         assert_eq!((b.range, a.range), ([tied / 3.0, (1.0 + tied) / 3.0], [0.25 / 3.0, 1.25 / 3.0]));
         // They share first place without x.
-        assert_eq!((found.first.clone(), found.leader()), (vec!["b", "a"], None));
+        assert_eq!((&found.first.solvers[..], found.leader()), (&[("b", 7), ("a", 1)][..], None));
+        assert_eq!(found.first.variations, 7);
     }
 
     #[test]
@@ -203,8 +215,11 @@ mod tests {
         ];
         let found = ranking(records.as_flattened());
         // No single scene decides, but without those that are placed b is first.
-        assert_eq!((found.standings[0].solver, found.first), ("a", vec!["a", "b"]));
-        assert_eq!(found.first_in, [vec!["a"], vec![], vec!["b"]]);
+        let [places, placed, arrives, moves] =
+            [&found.first, &found.first_in[0], &found.first_in[1], &found.first_in[2]]
+                .map(|first| &first.solvers[..]);
+        assert_eq!((found.standings[0].solver, places), ("a", &[("a", 8), ("b", 1)][..]));
+        assert_eq!((placed, arrives, moves), (&[("a", 6)][..], &[][..], &[("b", 3)][..]));
     }
 
     #[test]
@@ -216,7 +231,7 @@ mod tests {
             assert_eq!(names, ["b", "c", "a"]);
         }
         // All three tie, so nobody leads.
-        assert_eq!(ranking(&records).first.len(), 3);
+        assert_eq!(ranking(&records).first.solvers.len(), 3);
         assert!(ranking(&[]).standings.is_empty() && ranking(&[]).leader().is_none());
     }
 }

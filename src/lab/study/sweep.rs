@@ -1,6 +1,6 @@
 //! A sweep: one quantity takes several values, and everything else stays the same.
 //!
-//! The quantity belongs to solvers (a parameter), to the budget, or to the scene. Solvers without the
+//! The quantity belongs to solvers (a parameter), to the budget, to the scene, or to the kernels (their features). Solvers without the
 //! quantity are left out. If the step length changes, runs keep their duration. If friction changes, the
 //! scene has no reference value, because those of the catalog hold for the scene's own friction.
 
@@ -21,7 +21,7 @@ use std::str::FromStr;
 /// Maximum number of values in a sweep.
 const MOST: usize = 100;
 
-/// Quantities that a sweep can vary besides solver parameters: name, unit, owner.
+/// Quantities that a sweep can vary besides solver parameters: name, unit, kind.
 const QUANTITIES: [(&str, &str, QuantityKind); 10] = [
     ("substeps", "", QuantityKind::Substeps),
     ("iterations", "", QuantityKind::Iterations),
@@ -35,7 +35,7 @@ const QUANTITIES: [(&str, &str, QuantityKind); 10] = [
     ("features", "", QuantityKind::Features),
 ];
 
-/// Owner of a quantity.
+/// Kind of a quantity: what it belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum QuantityKind {
     /// A parameter of solvers.
