@@ -1,6 +1,6 @@
 //! Law: safe functions are sound for any input. Bad rows, bad contacts, wrong widths, short arrays and
 //! batches that were never filled panic with a message that names the problem. No read or write is out of
-//! bounds. Run this under valgrind as well (README, Benches).
+//! bounds.
 
 use simpulse::engine::clock::Clock;
 use simpulse::engine::constraints::ImpactLaw;

@@ -155,7 +155,9 @@ pub fn frozen(random: &mut Random, bytes: &mut Vec<u8>, seeds: &[Vec<u8>]) {
     // FNV-1a, implemented independently.
     let step = |hash: u64, byte| (hash ^ u64::from(byte)).wrapping_mul(1_099_511_628_211);
     let hash = payload.bytes().fold(14_695_981_039_346_656_037, step);
-    let sum = format!(r#""version":1,"bytes":{},"checksum":"fnv1a64:{hash:016x}""#, payload.len());
+    // Problems with joints have version 2.
+    let version = if payload.contains(r#""joints":[{"#) { 2 } else { 1 };
+    let sum = format!(r#""version":{version},"bytes":{},"checksum":"fnv1a64:{hash:016x}""#, payload.len());
     *bytes = format!("{{\"format\":\"simpulse-frozen\",{sum}}}\n{payload}\n").into_bytes();
 }
 

@@ -1,12 +1,13 @@
 //! Metrics on real runs: values that must be zero, values that must not, and values that can be computed
 //! independently.
 
+use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::{DEFAULT, Law, VARIANTS, find};
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::metrics::state::Angles;
 use simpulse::lab::metrics::{Errors, Observation};
-use simpulse::lab::scenes::{self, Scene, SceneBody, SceneShape};
+use simpulse::lab::scenes::{self, Circle, Geometry, Scene, SceneBody, SceneShape};
 use simpulse::lab::torture::TortureCase;
 use simpulse::lab::torture::families::FAMILIES;
 
@@ -30,9 +31,21 @@ fn at(errors: &Errors, name: &str) -> f64 {
     errors.get(name).unwrap_or_else(|| panic!("{name} of {errors:?}"))
 }
 
-fn json(bodies: &str, gravity: f64) -> Scene {
-    let text = format!(r#"{{"name":"x","gravity":[0,{gravity}],"bodies":[{bodies}]}}"#);
-    Scene::from_json(&text, "x.json".as_ref()).unwrap()
+fn scene<const N: usize>(bodies: [SceneBody; N]) -> Scene {
+    Scene::new("x", bodies.to_vec())
+}
+
+/// A box, its top at height 0.
+fn floor(half: f64) -> SceneBody {
+    SceneBody::fixed([0.0, -1.0], SceneShape::rectangle(half, 1.0))
+}
+
+fn disc(x: f64, y: f64) -> SceneBody {
+    SceneBody::dynamic([x, y], SceneShape::disc(0.5))
+}
+
+fn boxed(x: f64, y: f64) -> SceneBody {
+    SceneBody::dynamic([x, y], SceneShape::rectangle(0.5, 0.5))
 }
 
 #[test]
@@ -111,12 +124,7 @@ fn a_solver_without_friction_breaks_the_tangential_law_only() {
 
 #[test]
 fn penetration_is_what_the_poses_say() {
-    let scene = json(
-        r#"{"type":"static","position":[0,-1],"shapes":[{"box":{"half":[5,1]}}]},
-           {"type":"dynamic","position":[0,0.3],"shapes":[{"circle":{"radius":0.5}}]}"#,
-        0.0,
-    );
-    let mut world = build(&scene, "pgs");
+    let mut world = build(&scene([floor(5.0), disc(0.0, 0.3)]).weightless(), "pgs");
     let errors = observe(&mut world, 1);
     let depth = 0.5 - world.bodies.position_y[1] as f64;
     assert!(depth > 0.1 && depth < 0.2, "{depth}");
@@ -133,12 +141,9 @@ fn penetration_is_what_the_poses_say() {
 
 #[test]
 fn a_lift_gives_energy_that_is_accounted_for() {
-    let scene = json(
-        r#"{"type":"kinematic","position":[0,-1],"velocity":[0,1],"shapes":[{"box":{"half":[5,1]}}]},
-           {"type":"dynamic","position":[0,0.5],"velocity":[0,1],"shapes":[{"box":{"half":[0.5,0.5]}}]}"#,
-        -10.0,
-    );
-    let mut world = build(&scene, "pgs");
+    let lift = SceneBody { kind: BodyKind::Kinematic, ..floor(5.0) };
+    let rising = [lift, boxed(0.0, 0.5)].map(|body| body.moving([0.0, 1.0], 0.0));
+    let mut world = build(&scene(rising), "pgs");
     let errors = observe(&mut world, 120);
     // 2 m × 10 N = 20 J were added; the scale is 0.5 J + 10 N × √(1/6) m = 4.6 J.
     assert!(world.bodies.position_y[1] > 2.4);
@@ -148,24 +153,19 @@ fn a_lift_gives_energy_that_is_accounted_for() {
 #[test]
 fn rest_velocity_is_of_the_last_second() {
     // A constant 2 m/s, and a disc that spins at 2 rad/s: √(ω² r²/2) = 0.7071 m/s at r = 0.5.
-    let moving =
-        r#"{"type":"dynamic","position":[0,0],"velocity":[2,0],"shapes":[{"circle":{"radius":0.5}}]}"#;
-    let spinning =
-        r#"{"type":"dynamic","position":[0,0],"angular_velocity":2,"shapes":[{"circle":{"radius":0.5}}]}"#;
-    let speed = |body: &str| observe(&mut build(&json(body, 0.0), "pgs"), 90).get("rest_speed_m_s").unwrap();
-    assert!((speed(moving) - 2.0).abs() < 1e-6);
-    assert!((speed(spinning) - 0.5_f64.sqrt()).abs() < 1e-6);
+    let speed = |speed: f64, spin: f64| {
+        let scene = scene([disc(0.0, 0.0).moving([speed, 0.0], spin)]).weightless();
+        at(&observe(&mut build(&scene, "pgs"), 90), "rest_speed_m_s")
+    };
+    assert!((speed(2.0, 0.0) - 2.0).abs() < 1e-6);
+    assert!((speed(0.0, 2.0) - 0.5_f64.sqrt()).abs() < 1e-6);
 }
 
 /// A body that hits another within a step overlaps it before there is a contact. The reference is the lowest
 /// position of the disc, or the smallest distance between two discs, after any step.
 #[test]
 fn the_deepest_overlap_is_found_where_bodies_first_meet() {
-    let dropped = json(
-        r#"{"type":"static","position":[0,0],"shapes":[{"segment":{"a":[-9,0],"b":[9,0]}}]},
-           {"type":"dynamic","position":[0,5.5],"shapes":[{"circle":{"radius":0.5}}]}"#,
-        -10.0,
-    );
+    let dropped = scene([SceneBody::fixed([0.0, 0.0], SceneShape::line(9.0)), disc(0.0, 5.5)]);
     let pile = scenes::load("circle_pile:30").unwrap().scene;
     for variant in VARIANTS {
         for scene in [&dropped, &pile] {
@@ -227,16 +227,9 @@ fn overlap(world: &World) -> f64 {
 #[test]
 fn the_residual_per_body_does_not_fall_with_their_number() {
     let of = |copies: u32| {
-        let bodies: Vec<String> = (0..copies)
-            .map(|i| {
-                format!(
-                    r#"{{"type":"static","position":[{x},0],"shapes":[{{"box":{{"half":[1,1]}}}}]}},
-                       {{"type":"dynamic","position":[{x},1.45],"shapes":[{{"box":{{"half":[0.5,0.5]}}}}]}}"#,
-                    x = 10 * i
-                )
-            })
-            .collect();
-        observe(&mut build(&json(&bodies.join(","), -10.0), "pgs"), 30)
+        let pair = |x: f64| [SceneBody::fixed([x, 0.0], SceneShape::rectangle(1.0, 1.0)), boxed(x, 1.45)];
+        let bodies = (0..copies).flat_map(|i| pair(10.0 * f64::from(i))).collect();
+        observe(&mut build(&Scene::new("pairs", bodies), "pgs"), 30)
     };
     let (one, eight) = (of(1), of(8));
     assert!(
@@ -306,12 +299,7 @@ fn a_soft_contact_rests_at_its_analytic_floor() {
 
 #[test]
 fn a_solver_can_obey_its_own_law_and_break_the_rigid_one() {
-    let scene = json(
-        r#"{"type":"static","position":[0,-1],"shapes":[{"box":{"half":[5,1]}}]},
-           {"type":"dynamic","position":[0,0.4],"shapes":[{"circle":{"radius":0.5}}]}"#,
-        -10.0,
-    );
-    let errors = observe(&mut build(&scene, "pgs"), 1);
+    let errors = observe(&mut build(&scene([floor(5.0), disc(0.0, 0.4)]), "pgs"), 1);
     // The bias requests 0.3 · (0.1 − 0.005) m · 60/s = 1.71 m/s, and the disc reaches it. Under the rigid law
     // it should stand still: relative to m · 10 m/s² / 60, weight × step, the impulse is 10.26 too large.
     assert!((at(&errors, "residual_normal_max") - 10.26).abs() < 0.01, "{errors:?}");
@@ -331,16 +319,18 @@ fn a_solver_can_obey_its_own_law_and_break_the_rigid_one() {
     );
 }
 
+/// A box of this half height that slides on the floor with µ = 0.5.
+fn slide(half: f64, speed: f64) -> Scene {
+    let sliding = SceneBody::dynamic([0.0, half], SceneShape::rectangle(0.5, half)).moving([speed, 0.0], 0.0);
+    let mut scene = scene([floor(9.0), sliding]);
+    scene.bodies.iter_mut().for_each(|body| body.shapes[0].friction = 0.5);
+    scene
+}
+
 #[test]
 fn friction_takes_the_energy_of_a_slide() {
     // 1 kg at 1 m/s, µ = 0.5: stops after 0.2 s. Scale: ½ J + 10 N · √(1/6) m.
-    let scene = json(
-        r#"{"type":"static","position":[0,-1],"shapes":[{"box":{"half":[9,1]},"friction":0.5}]},
-           {"type":"dynamic","position":[0,0.5],"velocity":[1,0],
-            "shapes":[{"box":{"half":[0.5,0.5]},"friction":0.5}]}"#,
-        -10.0,
-    );
-    let mut world = build(&scene, "pgs");
+    let mut world = build(&slide(0.5, 1.0), "pgs");
     world.settings.budget.velocity_iterations = 100;
     let errors = observe(&mut world, 120);
     let scale = 0.5 + 10.0 / 6.0_f64.sqrt();
@@ -390,13 +380,10 @@ fn speed_from_nowhere_is_a_blow_up() {
 /// width of the thinnest shape would be infinite.
 #[test]
 fn a_shape_without_width_has_finite_errors() {
-    let scene = json(
-        r#"{"type":"static","position":[0,0],"shapes":[{"box":{"half":[50,1]}}]},
-           {"type":"dynamic","position":[0,0.5],"shapes":[{"box":{"half":[0.5,0.5]}}]},
-           {"type":"dynamic","position":[0,20],"shapes":[{"box":{"half":[0.5,0.5]}},
-               {"circle":{"center":[0,1e8],"radius":5}}]}"#,
-        0.0,
-    );
+    let mut far = boxed(0.0, 20.0);
+    far.shapes.push(SceneShape::new(Geometry::Circle(Circle { center: [0.0, 1e8], radius: 5.0 })));
+    let ground = SceneBody::fixed([0.0, 0.0], SceneShape::rectangle(50.0, 1.0));
+    let scene = scene([ground, boxed(0.0, 0.5), far]).weightless();
     let errors = observe(&mut build(&scene, "pgs"), 1);
     assert!(at(&errors, "penetration_max_m") > 0.0);
     assert_eq!(at(&errors, "penetration_relative"), 0.0);
@@ -537,16 +524,13 @@ fn a_body_far_away_changes_no_metric_but_the_scale_of_the_scene() {
 
 #[test]
 fn bodies_that_stay_apart_have_no_errors() {
-    let body = |i: i32| {
-        let (x, v, w) = (10 * i, 0.3 * f64::from(i), f64::from(i % 3));
-        format!(
-            r#"{{"type":"dynamic","position":[{x},0],"velocity":[{v},1],"angular_velocity":{w},
-                "shapes":[{{"box":{{"half":[0.5,0.3]}}}}]}}"#
-        )
+    let body = |i: u32| {
+        let body = SceneBody::dynamic([10.0 * f64::from(i), 0.0], SceneShape::rectangle(0.5, 0.3));
+        body.moving([0.3 * f64::from(i), 1.0], f64::from(i % 3))
     };
-    let bodies: Vec<String> = (0..5).map(body).collect();
+    let apart = Scene::new("apart", (0..5).map(body).collect());
     for solver in [DEFAULT, "soft_step", "pgs"] {
-        let errors = observe(&mut build(&json(&bodies.join(","), -10.0), solver), 60);
+        let errors = observe(&mut build(&apart, solver), 60);
         let balanced =
             ["momentum", "angular_momentum", "energy_change", "energy_created", "energy_unexplained"];
         for (metric, value) in errors.iter().filter(|(metric, _)| metric.name != "rest_speed_m_s") {
@@ -560,11 +544,7 @@ fn bodies_that_stay_apart_have_no_errors() {
 /// A gap is no overlap: the depth that a contact holds does not count from the bottom of a gap.
 #[test]
 fn discs_that_touch_part_and_touch_again_hold_no_depth() {
-    let scene = json(
-        r#"{"type":"static","position":[0,0],"shapes":[{"circle":{"radius":0.5}}]},
-           {"type":"dynamic","position":[1,0],"shapes":[{"circle":{"radius":0.5}}]}"#,
-        0.0,
-    );
+    let scene = scene([SceneBody { kind: BodyKind::Static, ..disc(0.0, 0.0) }, disc(1.0, 0.0)]).weightless();
     for solver in [DEFAULT, "soft_step", "pgs"] {
         // To a gap of 10 mm, within the distance at which contacts are found, and of 25 mm, beyond it.
         for gap in [0.010, 0.025] {
@@ -591,18 +571,9 @@ fn discs_that_touch_part_and_touch_again_hold_no_depth() {
 /// the largest of several rates.
 #[test]
 fn metrics_converge_as_the_step_goes_to_zero() {
-    let fall = json(r#"{"type":"dynamic","position":[0,0],"shapes":[{"circle":{"radius":0.5}}]}"#, -10.0);
-    let drop = json(
-        r#"{"type":"static","position":[0,0],"shapes":[{"segment":{"a":[-9,0],"b":[9,0]}}]},
-           {"type":"dynamic","position":[0,1.5],"shapes":[{"circle":{"radius":0.5}}]}"#,
-        -10.0,
-    );
-    let slide = json(
-        r#"{"type":"static","position":[0,-1],"shapes":[{"box":{"half":[9,1]},"friction":0.5}]},
-           {"type":"dynamic","position":[0,0.1],"velocity":[0.8,0],
-            "shapes":[{"box":{"half":[0.5,0.1]},"friction":0.5}]}"#,
-        -10.0,
-    );
+    let fall = scene([disc(0.0, 0.0)]);
+    let drop = scene([SceneBody::fixed([0.0, 0.0], SceneShape::line(9.0)), disc(0.0, 1.5)]);
+    let slide = slide(0.1, 0.8);
     let slope = scenes::load("incline_slip").unwrap().scene;
     // Energies of the slide: ½ 0.8² J kg⁻¹ and the weight times √(I/m).
     let lost = 0.32 / (0.32 + 10.0 * ((0.25_f64 + 0.01) / 3.0).sqrt());

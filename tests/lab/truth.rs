@@ -73,8 +73,8 @@ fn every_family_reproduces_the_stored_velocities() {
 }
 
 /// Lemke's method must certify a solution of every shaken pyramid, jammed or not: in theory there is one
-/// (copositive matrix, right-hand sides ≥ 0). Before a vanished artificial variable counted as having left
-/// the basis, two thirds of such problems ended on spurious rays.
+/// (copositive matrix, right-hand sides ≥ 0). An artificial variable that vanishes has left the basis; otherwise
+/// paths end on spurious rays.
 #[test]
 fn shaken_pyramids_are_certified() {
     for (base, friction) in [(2, 0.6), (3, 0.6), (4, 0.6), (6, 0.6), (6, 0.1), (6, 1.5)] {

@@ -321,7 +321,7 @@ mod tests {
         assert!((a - b).abs() < 1e-14, "{a} is not {b}");
     }
 
-    /// 1/5e-324 is infinite and made the norms NaN: a reference was accepted that its own check rejected.
+    /// 1/5e-324 is infinite; norms must not become NaN.
     #[test]
     fn a_mass_beyond_all_numbers_is_infinite() {
         let mut p = oblique();

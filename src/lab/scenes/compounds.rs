@@ -1,9 +1,9 @@
 //! D: bodies of two crossed triangles each, dropped into a yard.
 
-use super::holds::{Demand, Outside};
-use super::parts::{below_floor, yard};
+use super::holds::{Contained, Demand};
+use super::parts::{above_floor, yard};
 use super::tolerance::Tolerances;
-use super::truth::{Truth, Worst};
+use super::truth::none_outside;
 use super::{Entry, Geometry, Scene, SceneBody, SceneShape, SegmentGeometry};
 
 pub(super) const COMPOUNDS: Entry =
@@ -26,11 +26,8 @@ pub(super) const COMPOUNDS: Entry =
         }
         Scene::new("compounds", bodies).steps(500)
     })
-    .known(|scene, _| {
-        let below = Worst::from_step(u64::from(scene.steps), |view| Some(below_floor(view) as f64));
-        Truth::new("bodies below the floor at the end", "bodies", 0.0, below)
-    })
-    .holds(&[Demand::Contains(Outside(below_floor))])
+    .known(|scene, _| none_outside(scene, "bodies below the floor at the end", above_floor))
+    .holds(&[Demand::Contains(Contained(above_floor))])
     // A body fills 1.5 m² of its 4.5, and half of what is left between piled ones: the rows sink by half.
     .within(|scene, _| Tolerances::impacts(scene).truth(0.5, "none"));
 

@@ -5,7 +5,7 @@
 //! [`Observation::blown_up`](crate::lab::metrics::Observation::blown_up)) and that no body passes through a
 //! static or kinematic one. Further conditions are in its row of the catalog.
 
-use super::truth::View;
+use super::truth::{View, Within, outside};
 use crate::engine::bodies::BodyKind;
 use crate::engine::shapes::Shape;
 use crate::engine::world::World;
@@ -72,8 +72,8 @@ pub enum Demand {
     StaysStacked,
     /// No dynamic body moves farther than this from its start (m).
     StaysWithin(f64),
-    /// No body is outside, by the given count.
-    Contains(Outside),
+    /// All bodies are where they belong.
+    Contains(Contained),
     /// Every dynamic body's center stays in this box, given by its lower left and upper right corner (m).
     Inside([[f64; 2]; 2]),
     /// Moving bodies come to rest. The speed that may remain is a tolerance
@@ -85,9 +85,9 @@ pub enum Demand {
     GainsNoEnergy,
 }
 
-/// Counts the bodies that are outside their container.
+/// Says which bodies are in their container.
 #[derive(Clone, Copy, Debug)]
-pub struct Outside(pub(super) fn(&View) -> usize);
+pub struct Contained(pub(super) Within);
 
 /// Fraction of a body's reach, from its center to its farthest corner, by which it may move relative to a
 /// body that it touched: a unit box is then 0.35 m off, with its center still above the one below.
@@ -247,7 +247,7 @@ impl HoldWatch {
                 let is_met = |i: &usize| now[*i].distance(self.start[*i]) <= *limit;
                 dynamic().find(|i| !is_met(i)).map(Some)
             }
-            Demand::Contains(Outside(count)) => together(count(&View::of(world)) == 0),
+            Demand::Contains(Contained(within)) => together(outside(&View::of(world), *within) == 0),
             Demand::Inside([low, high]) => {
                 let inside = |i: usize, k: usize| (low[k]..=high[k]).contains(&now[i][k]);
                 dynamic().find(|&i| !(inside(i, 0) && inside(i, 1))).map(Some)
@@ -431,7 +431,7 @@ mod tests {
         assert_eq!(moved("stack:1", yard, 1, [0.9, 2.1]), Some(Mark::Tunneled));
         assert_eq!(moved("stack:1", yard, 1, [f32::NAN, 1.0]), Some(Mark::Tunneled));
         // Past the end of the ground.
-        let outside = &[Demand::Contains(Outside(|view| usize::from(view.center(1)[0] > 1.0)))];
+        let outside = &[Demand::Contains(Contained(|view, i| i != 1 || view.center(1)[0] <= 1.0))];
         assert_eq!(moved("stack:1", outside, 1, [2.0, 0.5]), Some(Mark::Tunneled));
     }
 

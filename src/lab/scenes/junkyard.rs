@@ -1,9 +1,9 @@
 //! D: a yard full of pentagons, and a pusher that plows through them.
 
-use super::holds::{Demand, Outside};
-use super::parts::{below_floor, yard};
+use super::holds::{Contained, Demand};
+use super::parts::{above_floor, yard};
 use super::tolerance::Tolerances;
-use super::truth::{Truth, Worst};
+use super::truth::none_outside;
 use super::{Entry, Scene, SceneBody, SceneShape};
 use crate::engine::bodies::BodyKind;
 use std::f64::consts::{PI, TAU};
@@ -23,11 +23,8 @@ pub(super) const JUNKYARD: Entry = Entry::new("junkyard", "8000 pentagons and a 
     }
     Scene::new("junkyard", bodies).steps(800)
 })
-.known(|scene, _| {
-    let below = Worst::from_step(u64::from(scene.steps), |view| Some(below_floor(view) as f64));
-    Truth::new("bodies below the floor at the end", "bodies", 0.0, below)
-})
-.holds(&[Demand::Contains(Outside(below_floor))])
+.known(|scene, _| none_outside(scene, "bodies below the floor at the end", above_floor))
+.holds(&[Demand::Contains(Contained(above_floor))])
 // The highest row starts at 54 m.
 .within(|scene, _| Tolerances::impacts(scene).truth(0.5, "none"));
 

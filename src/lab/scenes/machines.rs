@@ -1,8 +1,8 @@
 //! Machines: many joints at once, motors, springs and limits.
 
-use super::holds::{Demand, Outside};
+use super::holds::{Contained, Demand};
 use super::linked::{gaps, link};
-use super::parts::{below_floor, ground_line};
+use super::parts::{above_floor, ground_line};
 use super::tolerance::Tolerances;
 use super::truth::{Truth, View, Worst};
 use super::{Capsule, Entry, Geometry, Rectangle, Scene, SceneBody, SceneJoint, SceneShape};
@@ -61,7 +61,7 @@ pub(super) const VEHICLE: Entry = Entry::new("vehicle", "a car on springs that d
     Scene::new("vehicle", bodies).joined(joints).steps(600)
 })
 .known(|scene, _| gaps(scene, 0.0))
-.holds(&[Demand::Contains(Outside(below_floor))])
+.holds(&[Demand::Contains(Contained(above_floor))])
 .within(|scene, _| Tolerances::standard(scene).truth(0.005, "half a percent of a wheel's distance of 1 m"));
 
 /// A jib, a trolley, ten links of 1 kg and a load of a tonne.
@@ -148,12 +148,9 @@ pub(super) const SPINNER: Entry =
         let off = |view: &View| Some(f64::from(view.bodies.angular_velocity[1]) - PADDLE);
         Truth::new("speed of the paddle, last second", "rad/s", PADDLE, Worst::last_second(scene, off))
     })
-    .holds(&[Demand::Contains(Outside(|view| {
-        let inside = |&i: &usize| {
-            let [x, y] = view.center(i);
-            x.hypot(y - RING.0) <= RING.1 + 1.0
-        };
-        view.bodies.len() - (0..view.bodies.len()).filter(inside).count()
+    .holds(&[Demand::Contains(Contained(|view, i| {
+        let [x, y] = view.center(i);
+        x.hypot(y - RING.0) <= RING.1 + 1.0
     }))])
     .within(|scene, speed| Tolerances::impacts(scene).percent(speed));
 
@@ -192,5 +189,5 @@ pub(super) const HINGES: Entry =
     })
     .sized(20, 2, 200, "boxes in a column")
     .known(|scene, _| gaps(scene, 0.0))
-    .holds(&[Demand::Contains(Outside(below_floor))])
+    .holds(&[Demand::Contains(Contained(above_floor))])
     .within(|scene, _| Tolerances::impacts(scene).truth(0.0025, "half a percent of a box"));

@@ -148,21 +148,20 @@ pub(super) fn yard(half: i32, height: i32) -> SceneBody {
     SceneBody { shapes, ..SceneBody::fixed([0.0, 0.0], SceneShape::line(1.0)) }
 }
 
-/// Number of dynamic bodies whose center is below the middle of a floor at height 0; NaN counts.
-pub(super) fn below_floor(view: &View) -> usize {
-    let above = |&i: &usize| !view.bodies.is_dynamic(i) || view.center(i)[1] >= 0.0;
-    view.bodies.len() - (0..view.bodies.len()).filter(above).count()
+/// Whether a body is not dynamic, or has its center above the middle of a floor at height 0.
+pub(super) fn above_floor(view: &View, i: usize) -> bool {
+    !view.bodies.is_dynamic(i) || view.center(i)[1] >= 0.0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::scenes::truth::by_hand;
+    use crate::lab::scenes::truth::{by_hand, outside};
 
     #[test]
     fn below_the_floor_are_dynamic_bodies_and_nan() {
         let mut bodies = by_hand::bodies(&[[0.0, -1.0], [0.0, 0.5], [0.0, -0.1], [0.0, f32::NAN]]);
         bodies.kind[0] = BodyKind::Static;
-        assert_eq!(below_floor(&by_hand::view(&bodies, 1)), 2);
+        assert_eq!(outside(&by_hand::view(&bodies, 1), above_floor), 2);
     }
 }

@@ -1,9 +1,8 @@
 //! Ragdolls: Solver2D's human of eleven capsules and ten hinges with limits and friction.
 
-use super::holds::{Demand, Outside};
+use super::holds::{Contained, Demand};
 use super::linked::gaps;
 use super::tolerance::Tolerances;
-use super::truth::View;
 use super::{Capsule, Entry, Geometry, Scene, SceneBody, SceneJoint, SceneShape};
 use crate::engine::joints::{JointKind, Motor, Revolute, Spring};
 use std::f64::consts::PI;
@@ -91,15 +90,10 @@ pub(super) const PILE: Entry = Entry::new("ragdolls", "humans that fall into a t
 })
 .sized(6, 1, 200, "humans")
 .known(|scene, _| gaps(scene, 0.5))
-.holds(&[Demand::Contains(Outside(|view| below(view, -5.0)))])
+.holds(&[Demand::Contains(Contained(|view, i| view.center(i)[1] >= -5.0))])
 .within(|scene, _| Tolerances::impacts(scene).truth(0.005, SEEN));
 
 const SEEN: &str = "a centimeter between two bones is seen";
-
-/// Number of bodies whose center is below `height` (m); NaN counts.
-fn below(view: &View, height: f64) -> usize {
-    view.bodies.len() - (0..view.bodies.len()).filter(|&i| view.center(i)[1] >= height).count()
-}
 
 /// Number of floors, and the distance from one to the next (m).
 const FLOORS: (u32, f64) = (5, 45.0);
@@ -132,5 +126,5 @@ pub(super) const RAIN: Entry = Entry::new("rain", "humans that rain on five floo
 .sized(2, 1, 40, "groups of humans on each floor")
 .known(|scene, _| gaps(scene, 0.5))
 // The lowest floor is at 0.
-.holds(&[Demand::Contains(Outside(|view| below(view, -5.0)))])
+.holds(&[Demand::Contains(Contained(|view, i| view.center(i)[1] >= -5.0))])
 .within(|scene, _| Tolerances::impacts(scene).truth(0.005, SEEN));

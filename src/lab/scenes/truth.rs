@@ -159,6 +159,20 @@ impl Observer for Worst {
     }
 }
 
+/// Whether a body is where it belongs. NaN is nowhere.
+pub(super) type Within = fn(&View, usize) -> bool;
+
+/// Number of bodies that are not where they belong.
+pub(super) fn outside(view: &View, within: Within) -> usize {
+    (0..view.bodies.len()).filter(|&i| !within(view, i)).count()
+}
+
+/// All bodies are where they belong at the end.
+pub(super) fn none_outside(scene: &Scene, quantity: &'static str, within: Within) -> Truth {
+    let at_end = Worst::from_step(u64::from(scene.steps), move |view| Some(outside(view, within) as f64));
+    Truth::new(quantity, "bodies", 0.0, at_end)
+}
+
 /// Upward load on all static bodies over the last step (N): the impulse that
 /// reaches dynamic bodies through contacts with them, against gravity.
 ///

@@ -1,8 +1,8 @@
 //! D: a turning square drum, half full of small boxes.
 
-use super::holds::{Demand, Outside};
+use super::holds::{Contained, Demand};
 use super::tolerance::Tolerances;
-use super::truth::{Truth, View, Worst};
+use super::truth::{View, none_outside};
 use super::{Entry, Scene, SceneBody, SceneShape};
 use crate::engine::bodies::BodyKind;
 
@@ -26,37 +26,30 @@ pub(super) const TUMBLER: Entry = Entry::new("tumbler", "2025 boxes in a turning
     }
     Scene::new("tumbler", bodies).steps(750)
 })
-.known(|scene, _| {
-    let outside = Worst::from_step(u64::from(scene.steps), |view| Some(escaped(view) as f64));
-    Truth::new("boxes outside the drum at the end", "bodies", 0.0, outside)
-})
-.holds(&[Demand::Contains(Outside(escaped))])
+.known(|scene, _| none_outside(scene, "boxes outside the drum at the end", inside))
+.holds(&[Demand::Contains(Contained(inside))])
 // Boxes fall across the drum.
 .within(|scene, _| Tolerances::impacts(scene).truth(0.5, "none"));
 
-/// Number of bodies whose center is beyond the middle of a wall of the drum, which is body 0; NaN counts.
-fn escaped(view: &View) -> usize {
-    let [x, y] = view.center(0);
+/// Whether a body is the drum, or has its center within the middle of its walls.
+fn inside(view: &View, i: usize) -> bool {
+    let ([x, y], [bx, by]) = (view.center(0), view.center(i));
     let (cos, sin) = (f64::from(view.bodies.rotation_cos[0]), f64::from(view.bodies.rotation_sin[0]));
-    let inside = |i: &usize| {
-        let [bx, by] = view.center(*i);
-        let (dx, dy) = (bx - x, by - y);
-        (cos * dx + sin * dy).abs() <= REACH && (cos * dy - sin * dx).abs() <= REACH
-    };
-    view.bodies.len() - 1 - (1..view.bodies.len()).filter(inside).count()
+    let (dx, dy) = (bx - x, by - y);
+    i == 0 || (cos * dx + sin * dy).abs() <= REACH && (cos * dy - sin * dx).abs() <= REACH
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::scenes::truth::by_hand;
+    use crate::lab::scenes::truth::{by_hand, outside};
 
     #[test]
     fn the_escaped_are_those_outside_the_turned_square() {
         let escaped = |p: [f32; 2], turn: f32| {
             let mut bodies = by_hand::bodies(&[[1.0, 10.0], [1.0, 0.5], p]);
             (bodies.rotation_cos[0], bodies.rotation_sin[0]) = (turn.cos(), turn.sin());
-            escaped(&by_hand::view(&bodies, 1))
+            outside(&by_hand::view(&bodies, 1), inside)
         };
         assert_eq!(escaped([1.0, 10.0], 0.0), 0);
         // The corner of the square is 14 m away: inside at rest, outside after an eighth of a turn.

@@ -1,8 +1,8 @@
 //! D: a turning drum with four lobes, full of small boxes.
 
-use super::holds::{Demand, Outside};
+use super::holds::{Contained, Demand};
 use super::tolerance::Tolerances;
-use super::truth::{Truth, View, Worst};
+use super::truth::{View, none_outside};
 use super::{Entry, Scene, SceneBody, SceneShape};
 use crate::engine::bodies::BodyKind;
 
@@ -29,11 +29,8 @@ pub(super) const WASHER: Entry = Entry::new("washer", "8100 boxes in a turning d
     }
     Scene::new("washer", bodies).steps(500)
 })
-.known(|scene, _| {
-    let outside = Worst::from_step(u64::from(scene.steps), |view| Some(escaped(view) as f64));
-    Truth::new("boxes outside the drum at the end", "bodies", 0.0, outside)
-})
-.holds(&[Demand::Contains(Outside(escaped))])
+.known(|scene, _| none_outside(scene, "boxes outside the drum at the end", inside))
+.holds(&[Demand::Contains(Contained(inside))])
 // Boxes fall across the drum.
 .within(|scene, _| Tolerances::impacts(scene).truth(0.5, "none"));
 
@@ -49,25 +46,22 @@ fn wedge(inner: f64, outer: f64, index: u32, wider: f64) -> SceneShape {
     SceneShape::polygon(vec![at(inner, from), at(outer, from), at(outer, to), at(inner, to)])
 }
 
-/// Number of bodies whose center is in or beyond the wall of the drum, which is body 0; NaN counts.
-fn escaped(view: &View) -> usize {
-    let [x, y] = view.center(0);
-    let inside = |i: &usize| {
-        let [bx, by] = view.center(*i);
-        (bx - x).hypot(by - y) <= RADII[1]
-    };
-    view.bodies.len() - 1 - (1..view.bodies.len()).filter(inside).count()
+/// Whether a body is the drum, or has its center within the inside of its wall.
+fn inside(view: &View, i: usize) -> bool {
+    let ([x, y], [bx, by]) = (view.center(0), view.center(i));
+    i == 0 || (bx - x).hypot(by - y) <= RADII[1]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::scenes::truth::by_hand;
+    use crate::lab::scenes::truth::{by_hand, outside};
 
     #[test]
     fn the_escaped_are_those_beyond_the_wall() {
-        let escaped =
-            |x: f32| escaped(&by_hand::view(&by_hand::bodies(&[[1.0, 10.0], [1.0, 0.0], [x, 10.0]]), 1));
+        let escaped = |x: f32| {
+            outside(&by_hand::view(&by_hand::bodies(&[[1.0, 10.0], [1.0, 0.0], [x, 10.0]]), 1), inside)
+        };
         assert_eq!(escaped(0.0), 0);
         assert_eq!(escaped(-14.0), 0);
         assert_eq!(escaped(18.0), 1);
