@@ -278,11 +278,12 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     let not_held: String = plan.not_held()?.iter().map(|line| format!("skipped: {line}\n")).collect();
     note(&(without + &overrides::partly(&plan.solvers, &plan.overrides) + &not_held));
     // Fail before the long computation, not after it.
+    let earlier = if args.resume { Some(StudyFile::read(&args.out)?) } else { None };
     files::prepare_folder(&args.out)?;
     let lock = files::Lock::of(&args.out)?;
     let found_out: String =
         plan.find_out()?.iter().map(|line| answer::wrapped(&format!("{line}\n"))).collect();
-    let earlier = if args.resume { Some(earlier(&args.out, &plan)?) } else { None };
+    let earlier = earlier.map(|earlier| resumed(earlier, &args.out, &plan)).transpose()?;
     let list = args.out.join(found::NAME);
     let found = match earlier.is_some() && plan.thorough && list.is_file() {
         true => Found::of_csv(&std::fs::read_to_string(&list).map_err(Error::io(&list))?)?,
@@ -383,9 +384,8 @@ fn kept_note(kept: &Option<PathBuf>) -> String {
         .map_or(String::new(), |place| format!("the study that was there is now in {}\n", place.display()))
 }
 
-/// The study in a folder, to go on with. Errors: none there; a study with other settings.
-fn earlier(out: &Path, plan: &StudyPlan) -> Result<StudyFile, Error> {
-    let earlier = StudyFile::read(out)?;
+/// The study of a folder, to go on with. Errors: a study with other settings.
+fn resumed(earlier: StudyFile, out: &Path, plan: &StudyPlan) -> Result<StudyFile, Error> {
     let list: Vec<String> = differing_settings(&earlier.settings, &settings(plan))
         .into_iter()
         .filter(|(name, _)| name != "budget_search")

@@ -99,7 +99,7 @@ fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> Strin
     }
     if ranking.leader().is_none() && ranking.first.solvers.len() > 1 {
         text += &format!(
-            "  By speed there is no clear leader: with a scene or class left out or other tolerances, first is {}.",
+            "  No solver is the fastest throughout: with a scene or class left out or other tolerances, first is {}.",
             first_places(&ranking.first, 6)
         );
     }

@@ -4,6 +4,7 @@ use crate::lab::chart::scale::number;
 use crate::lab::chart::{Axis, Chart, ChartMark, FailStrip, LineStyle, Scale, Series, Style};
 use crate::lab::report::by_scene;
 use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, distinct, solvers_of};
+use crate::lab::study::search::LEVELS;
 use crate::lab::study::sweep::Swept;
 use crate::lab::study::{Record, answer};
 use crate::lab::units::{lanes, si};
@@ -143,22 +144,21 @@ fn precision_chart(
 const DRAWN: [f64; 2] = [1e-3, 1e4];
 
 /// Time relative to the fastest setting that holds against the largest error ÷ tolerance, over all scenes: a small mark
-/// per setting and scene, a large one for the geometric mean of a budget. `None` if nothing holds.
+/// per setting and scene, a large one for the geometric mean of a solver's cheapest settings within each of the
+/// [`LEVELS`] of the tolerances. `None` if nothing holds.
 pub fn overview(records: &[Record]) -> Option<Chart> {
     let wrong = |r: &Record| Some(r.excess()).filter(|x| x.is_finite()).map(|x| x.clamp(DRAWN[0], DRAWN[1]));
-    // The record, its time relative to the fastest, and the number of the setting among those of its solver.
-    let mut dots: Vec<(&Record, f64, usize)> = Vec::new();
+    // The record, and its time relative to the fastest.
+    let mut dots: Vec<(&Record, f64)> = Vec::new();
     for scene in scenes(records) {
         let settings: Vec<&Record> =
             answer::each_setting(scene).into_iter().filter(|r| !r.order.is_serial()).collect();
         let least =
             settings.iter().filter(|r| r.holds()).filter_map(|r| time(r)).fold(f64::INFINITY, f64::min);
-        for solver in solvers_of(records).into_iter().filter(|_| least.is_finite()) {
-            // Other treatments of contacts are separate runs that do not exist on every scene.
-            let first = (scene[0].impacts, scene[0].frozen);
-            let own = settings.iter().filter(|r| r.solver == solver && (r.impacts, r.frozen) == first);
-            dots.extend(own.enumerate().filter_map(|(i, r)| Some((*r, time(r)? / least, i))));
-        }
+        // Other treatments of contacts are separate runs that do not exist on every scene.
+        let first = |r: &&&Record| (r.impacts, r.frozen) == (scene[0].impacts, scene[0].frozen);
+        let own = settings.iter().filter(first).filter(|_| least.is_finite());
+        dots.extend(own.filter_map(|r| Some((*r, time(r)? / least))));
     }
     if dots.is_empty() {
         return None;
@@ -166,7 +166,7 @@ pub fn overview(records: &[Record]) -> Option<Chart> {
     let mut series = Vec::new();
     for solver in solvers_of(records) {
         let own = || dots.iter().filter(|d| d.0.solver == solver);
-        let small = own().map(|(r, slower, _)| {
+        let small = own().map(|(r, slower)| {
             let title = format!("{solver} on {}: {}, {}× the fastest", r.scene, words(r), number(*slower));
             match wrong(r) {
                 Some(x) => {
@@ -183,27 +183,27 @@ pub fn overview(records: &[Record]) -> Option<Chart> {
     for solver in solvers_of(records) {
         let own = || dots.iter().filter(|d| d.0.solver == solver);
         let mut means: Vec<ChartMark> = Vec::new();
-        for budget in 0..=own().map(|d| d.2).max().unwrap_or(0) {
-            let held: Vec<[f64; 2]> =
-                own().filter(|d| d.2 == budget).filter_map(|d| Some([wrong(d.0)?, d.1])).collect();
-            if held.is_empty() {
-                continue;
-            }
-            let mean = |k: usize| (held.iter().map(|v| v[k].ln()).sum::<f64>() / held.len() as f64).exp();
-            let (holds, of) = (held.len(), scenes(records).len());
+        for level in LEVELS {
+            let cheapest = |scene: &[Record]| {
+                let within = own().filter(|d| d.0.scene == scene[0].scene && d.0.excess_at(level) <= 1.0);
+                let (record, slower) = within.min_by(|a, b| a.1.total_cmp(&b.1))?;
+                Some([wrong(record)?, *slower])
+            };
+            let met: Vec<[f64; 2]> = scenes(records).into_iter().filter_map(cheapest).collect();
+            let mean = |k: usize| (met.iter().map(|v| v[k].ln()).sum::<f64>() / met.len() as f64).exp();
+            let (count, of) = (met.len(), scenes(records).len());
             let title = format!(
-                "{solver}, its budget {}: holds on {holds} of {of} scenes; on those its geometric mean error is {} × tolerance, its time {}× the fastest",
-                budget + 1,
+                "{solver} within {level} × the tolerances: on {count} of {of} scenes; on those its geometric mean error is {} × tolerance, its time {}× the fastest",
                 number(mean(0)),
                 number(mean(1))
             );
-            let label = match holds == of {
-                true => solver.to_string(),
-                false => format!("{solver}, fails on {} of {of}", of - holds),
+            let label = match (level == 1.0, count == of) {
+                (false, _) => String::new(),
+                (_, true) => solver.to_string(),
+                (_, false) => format!("{solver}, fails on {} of {of}", of - count),
             };
-            let mark = ChartMark::at(mean(0), mean(1), 5.5 + 1.2 * means.len().min(4) as f64, title);
-            means.iter_mut().for_each(|mark| mark.label.clear());
-            means.push(ChartMark { hollow: holds < of, label, ..mark });
+            let mark = ChartMark::at(mean(0), mean(1), 5.5 + 1.2 * means.len() as f64, title);
+            means.extend((count > 0).then_some(ChartMark { hollow: count < of, label, ..mark }));
         }
         series.push(Series::line(Style::of(solver), means));
     }

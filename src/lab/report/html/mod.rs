@@ -112,7 +112,7 @@ fn sections(
     let overview = match charts::overview(records) {
         Some(chart) => vec![
             plain(
-                "Small marks: every solver and budget on every scene, in colored order, at its fastest lane width. Large marks: the geometric mean of a budget over all scenes, from its first budget on each scene to its last; hollow ones omit scenes on which it fails, and their names say how many. Lower left is better; settings that fail are in the strip “fails” at the right.",
+                "Small marks: every solver and budget on every scene, in colored order, at its fastest lane width. Large marks: a solver’s cheapest settings within 2, 1, 0.5, 0.1 and 0.01 times the tolerances of each scene, the larger the stricter, geometric mean over scenes. Hollow ones omit scenes on which no setting is as good; names stand at 1 × and say on how many. Lower left is better; settings that fail are in the strip “fails” at the right.",
             ),
             legend(),
             DocBlock::Charts("one", vec![chart]),
