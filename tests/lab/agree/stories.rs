@@ -7,12 +7,13 @@
 use super::methods::{Against, Fault, KeptState, Run, against};
 use super::{MANY, Model, ModelState, determined, distance, left_out, most, worse};
 use simpulse::engine::constraints::ImpactLaw;
-use simpulse::engine::constraints::kernels::motion::RotationUpdate;
+use simpulse::engine::contacts::{Contact, ManifoldPoint};
 use simpulse::engine::narrowphase::frozen::{FreezeLimits, Freezing};
 use simpulse::engine::params::{Budget, RESTITUTION_THRESHOLD};
 use simpulse::engine::solvers::Variant;
 use simpulse::engine::world::{Order, Settings, World};
 use simpulse::lab::capture::capture;
+use simpulse::lab::reference::problem::minus;
 use simpulse::lab::reference::rows::OwnRow;
 use simpulse::lab::reference::{ContactProblem, DPair, ProblemContact, Target, Velocity};
 use simpulse::lab::scenes::{Scene, SceneBody, SceneJoint, SceneShape};
@@ -71,27 +72,60 @@ fn cube(at: [f64; 2]) -> SceneBody {
 /// Shapes and feature of a contact point.
 type PointName = (u32, u32, u32);
 
-/// What the method keeps of a point: its impulses, and its drift since it began to stick (m).
-type KeptPoint = (DPair, f64);
-
-/// Center, cosine and sine of the rotation, and velocities of every body of a problem.
-fn states(world: &World) -> Vec<([f64; 4], Velocity)> {
+/// Centers and angles, and velocities of the bodies of a problem.
+fn state(world: &World) -> [Vec<Velocity>; 2] {
     let b = &world.bodies;
-    let state = |i: usize| {
-        let [[x, y], turn] = [b.center(i), [b.rotation_cos[i], b.rotation_sin[i]].map(f64::from)];
-        let v = [b.velocity_x[i], b.velocity_y[i], b.angular_velocity[i]].map(f64::from);
-        ([x, y, turn[0], turn[1]], v)
-    };
-    (0..b.len()).filter(|&i| b.inv_mass[i] > 0.0).map(state).collect()
+    let place = |i: usize| [b.center(i)[0], b.center(i)[1], b.angle(i).into()];
+    let velocity = |i: usize| [b.velocity_x[i], b.velocity_y[i], b.angular_velocity[i]].map(f64::from);
+    let moving: Vec<usize> = (0..b.len()).filter(|&i| b.inv_mass[i] > 0.0).collect();
+    [moving.iter().map(|&i| place(i)).collect(), moving.iter().map(|&i| velocity(i)).collect()]
 }
 
-/// Motion from one state to another.
-fn moves(from: &[([f64; 4], Velocity)], to: &[([f64; 4], Velocity)]) -> Vec<Velocity> {
-    let turn = |a: &[f64; 4], b: &[f64; 4]| (a[2] * b[3] - a[3] * b[2]).atan2(a[2] * b[2] + a[3] * b[3]);
-    from.iter().zip(to).map(|((a, _), (b, _))| [b[0] - a[0], b[1] - a[1], turn(a, b)]).collect()
+/// Every contact point, with its contact.
+fn points(world: &World) -> impl Iterator<Item = (&Contact, &ManifoldPoint)> {
+    world.contacts.iter().flat_map(|c| c.manifold.points().iter().map(move |p| (c, p)))
+}
+
+/// Sets the targets of points that bounce in their rows. Returns those that bounce at the end of the step, with their
+/// rebound speeds (m/s).
+fn bounce(problem: &mut ContactProblem, world: &World, law: ImpactLaw, inward: bool) -> Vec<(usize, f64)> {
+    let (mut ends, [_, velocities]) = (Vec::new(), state(world));
+    for (i, (c, (on, _))) in problem.contacts.iter_mut().zip(points(world)).enumerate() {
+        let (v, e) = (c.velocity(&velocities)[0], f64::from(on.restitution));
+        let target = if inward { e * v } else { -e * v };
+        match law {
+            ImpactLaw::Bias if -v > RESTITUTION_THRESHOLD.into() && -v * problem.h > c.gap => {
+                c.rebound = target
+            }
+            // In these scenes, all points that bounce are new.
+            ImpactLaw::EndPass { threshold, .. } if e > 0.0 && -v > threshold.into() => {
+                ends.push((i, target))
+            }
+            _ => {}
+        }
+    }
+    ends
 }
 
 impl Story {
+    /// The scene under a solver, with a step of one substep.
+    fn world(&self, variant: &'static Variant) -> World {
+        let is_solution = matches!(against(variant.name), Some(Against::Solution(_)));
+        let whole = if is_solution { variant.of_iterations(MANY) } else { variant.budget };
+        let velocity_iterations = whole.velocity_iterations.min(most(variant.name));
+        let settings = Settings {
+            order: Order::Natural,
+            frozen: self.freezing,
+            without: left_out(variant),
+            budget: Budget { substeps: 1, velocity_iterations, ..whole },
+            ..Settings::new(variant)
+        };
+        let (bodies, joints) = (self.scene)();
+        let ground = SceneBody::fixed([0.0, -1.0], SceneShape::rectangle(50.0, 1.0).friction(0.4));
+        let bodies = std::iter::once(ground).chain(bodies).collect();
+        Scene::new(self.name, bodies).joined(joints).build(settings).unwrap()
+    }
+
     /// The largest distance from the method in three steps (1); zero if the solver is not compared.
     pub fn apart(&self, variant: &'static Variant, fault: Option<Fault>) -> f64 {
         if !(self.takes)(variant) {
@@ -99,87 +133,52 @@ impl Story {
         }
         let of = against(variant.name).unwrap();
         let (Against::Method(method) | Against::Solution(method)) = of;
-        let whole =
-            if matches!(of, Against::Solution(_)) { variant.of_iterations(MANY) } else { variant.budget };
-        let velocity_iterations = whole.velocity_iterations.min(most(variant.name));
-        let budget = Budget { substeps: 1, velocity_iterations, ..whole };
-        let (order, frozen, without) = (Order::Natural, self.freezing, left_out(variant));
-        let settings = Settings {
-            order,
-            frozen,
-            without,
-            budget,
-            continuous: false,
-            rotation: RotationUpdate::Exact,
-            ..Settings::new(variant)
-        };
-        let (bodies, joints) = (self.scene)();
-        let ground = SceneBody::fixed([0.0, -1.0], SceneShape::rectangle(50.0, 1.0).friction(0.4));
-        let bodies = std::iter::once(ground).chain(bodies).collect();
-        let mut world = Scene::new(self.name, bodies).joined(joints).build(settings).unwrap();
-        let mut kept: HashMap<PointName, KeptPoint> = HashMap::new();
-        let (mut of_joints, mut steepness, mut worst) = (Vec::new(), 0.0, 0.0);
-        let mut first = None;
+        let mut world = self.world(variant);
+        // Impulses of every point, and its drift since it began to stick (m).
+        let mut kept: HashMap<PointName, (DPair, f64)> = HashMap::new();
+        let (mut of_joints, mut steepness, mut worst, mut first) = (Vec::new(), 0.0, 0.0, None);
         // Penalties of `avbd` are not kept: its first step is compared alone.
         for _ in 0..if variant.name == "avbd" { 1 } else { 3 } {
-            let before = states(&world);
+            let before = state(&world)[0].clone();
             let mut problem = capture(&mut world, self.name);
             if self.freezing != Freezing::Off {
                 let (first, then) = first.get_or_insert_with(|| (problem.clone(), before.clone()));
-                freeze(&mut problem.contacts, first, moves(then, &before));
+                freeze(&mut problem.contacts, first, minus(&before, then));
             }
-            let points = world.contacts.iter().flat_map(|c| c.manifold.points().iter().map(move |p| (c, p)));
-            let mut names: Vec<PointName> = Vec::new();
-            // Points that bounce at the end of the step, and their rebound speeds.
-            let mut ends = Vec::new();
-            let velocities: Vec<Velocity> = before.iter().map(|state| state.1).collect();
-            for (i, (on, point)) in points.enumerate() {
-                names.push((on.shape_a, on.shape_b, point.feature_id));
-                let c = &mut problem.contacts[i];
-                let (v, e) = (c.velocity(&velocities)[0], f64::from(on.restitution));
-                match variant.impacts {
-                    ImpactLaw::Bias if -v > RESTITUTION_THRESHOLD.into() && -v * problem.h > c.gap => {
-                        c.rebound = if fault == Some(Fault::Inward) { e * v } else { -e * v };
-                    }
-                    // Points that only bounce when they are new: none of these scenes has an impact on another.
-                    ImpactLaw::EndPass { threshold, .. } if e > 0.0 && -v > threshold.into() => {
-                        ends.push((i, -e * v))
-                    }
-                    _ => {}
-                }
-            }
-            let last = |name: &PointName| kept.get(name).copied().unwrap_or_default();
+            let ends = bounce(&mut problem, &world, variant.impacts, fault == Some(Fault::Inward));
+            let name = |(c, p): (&Contact, &ManifoldPoint)| (c.shape_a, c.shape_b, p.feature_id);
+            let names: Vec<PointName> = points(&world).map(name).collect();
+            let last: Vec<_> = names.iter().map(|name| kept.get(name).copied().unwrap_or_default()).collect();
             of_joints.resize(problem.joint_rows(), [0.0; 2]);
-            let start = names.iter().map(|name| last(name).0).chain(of_joints).collect();
+            let start = last.iter().map(|last| last.0).chain(of_joints).collect();
             let rate = f64::from(variant.defaults()[0]) / problem.h;
             let rows = problem.joints.iter().flat_map(|joint| joint.rows());
             let rows = rows.map(|row| OwnRow { bias: rate * row.error, compliance: 0.0 });
             let own: Vec<OwnRow> = names.iter().map(|_| OwnRow::default()).chain(rows).collect();
-            let state = KeptState { drifts: names.iter().map(|name| last(name).1).collect(), steepness };
-            let run = Run { variant, budget, undo: None, fault, kept: state.into() };
+            let state_before = KeptState { drifts: last.iter().map(|last| last.1).collect(), steepness };
+            let budget = world.settings.budget;
+            let run = Run { variant, budget, undo: None, fault, kept: state_before.into() };
             let mut model = Model::new(&problem, Target::Own(&own), start);
             method(&mut model, &run);
             rebound_at_end(&mut model, &ends);
-            let (source, state) = (ModelState { v: model.v, x: model.x, l: model.l }, run.kept.into_inner());
-            steepness = state.steepness;
+            let source = ModelState { v: model.v, x: model.x, l: model.l };
             let stored = if fault == Some(Fault::HalfStored) { 0.5 } else { 1.0 };
-            let forgets = fault == Some(Fault::NoAnchors) || state.drifts.is_empty();
-            let point =
-                |i: usize| (source.l[i].map(|l| stored * l), if forgets { 0.0 } else { state.drifts[i] });
+            let anchored = if fault == Some(Fault::NoAnchors) { 0.0 } else { 1.0 };
+            let now = run.kept.into_inner();
+            let point = |i: usize| (source.l[i].map(|l| stored * l), anchored * now.drifts[i]);
             kept = names.iter().enumerate().map(|(i, name)| (*name, point(i))).collect();
-            of_joints = source.l[names.len()..].to_vec();
+            (of_joints, steepness) = (source.l[names.len()..].to_vec(), now.steepness);
             world.step().unwrap();
-            let points = world.contacts.iter().flat_map(|c| c.manifold.points());
-            let mut l: Vec<DPair> =
-                points.map(|p| [p.normal_impulse, p.tangent_impulse].map(f64::from)).collect();
-            let after = states(&world);
+            let impulses =
+                |(_, p): (&Contact, &ManifoldPoint)| [p.normal_impulse, p.tangent_impulse].map(f64::from);
+            let mut l: Vec<DPair> = points(&world).map(impulses).collect();
+            let [x, v] = state(&world);
             // Those of joints are in the next problem.
             let next = capture(&mut world, self.name);
             l.extend(next.warm_impulses().split_off(next.contacts.len()));
-            let v = after.iter().map(|state| state.1).collect();
-            let here = ModelState { v, x: moves(&before, &after), l };
-            let (time, determined) = (problem.h, determined(&problem, variant.name, of));
-            worst = worse(worst, distance(&problem, time, &here, &source, &determined));
+            let here = ModelState { v, x: minus(&x, &before), l };
+            let determined = determined(&problem, variant.name, of);
+            worst = worse(worst, distance(&problem, problem.h, &here, &source, &determined));
         }
         worst
     }
