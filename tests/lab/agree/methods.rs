@@ -227,6 +227,7 @@ fn symmetric(model: &mut Model, run: &Run) {
     let back = ScalarSweep { reversed: run.undoes(0), ..sweep };
     let pair = |m: &mut Model| {
         m.sweep(&sweep);
+        rebound(m);
         m.sweep_in(&back, (0..m.manifolds.len()).rev());
     };
     substeps(model, run, false, pair, |_| ());

@@ -5,15 +5,15 @@
 //! solved in natural order.
 
 use super::methods::{Against, Fault, KeptState, Run, against};
-use super::rules::ScalarRule;
-use super::{MANY, Model, ModelState, determined, distance, left_out, worse};
+use super::{MANY, Model, ModelState, determined, distance, left_out, most, worse};
 use simpulse::engine::constraints::ImpactLaw;
+use simpulse::engine::contacts::{Contact, ManifoldPoint};
 use simpulse::engine::narrowphase::frozen::{FreezeLimits, Freezing};
 use simpulse::engine::params::{Budget, RESTITUTION_THRESHOLD};
 use simpulse::engine::solvers::Variant;
 use simpulse::engine::world::{Order, Settings, World};
 use simpulse::lab::capture::capture;
-use simpulse::lab::reference::oracle::ScalarSweep;
+use simpulse::lab::reference::problem::minus;
 use simpulse::lab::reference::rows::OwnRow;
 use simpulse::lab::reference::{ContactProblem, DPair, ProblemContact, Target, Velocity};
 use simpulse::lab::scenes::{Scene, SceneBody, SceneJoint, SceneShape};
@@ -33,14 +33,16 @@ const JOINED: [&str; 6] = ["pgs", "apgd", "barzilai_borwein", "staggered", "admm
 
 pub static ALL: [Story; 3] = [
     Story {
-        name: "a disc that hits a box",
+        name: "a corner that hits a box",
         scene: || {
-            let disc = SceneShape::disc(0.5).restitution(0.5);
-            (vec![cube([0.0, 0.5]), SceneBody::dynamic([0.2, 1.52], disc).moving([0.5, -3.0], 0.0)], vec![])
+            let shape = SceneShape::rectangle(0.5, 0.5).friction(0.4).restitution(0.5);
+            let corner = SceneBody::dynamic([0.2, 1.71], shape).turned(0.6).moving([0.5, -3.0], 0.0);
+            (vec![cube([0.0, 0.5]), corner], vec![])
         },
         freezing: Freezing::Off,
-        // The impact laws of these are not rewritten.
-        takes: |variant| !matches!(variant.name, "xpbd"),
+        // The impact law of `xpbd` is not rewritten; `shock` revives the rows of points that bounce when it changes
+        // masses.
+        takes: |variant| !matches!(variant.name, "xpbd" | "shock"),
     },
     Story {
         name: "two boxes on a hinge",
@@ -70,142 +72,120 @@ fn cube(at: [f64; 2]) -> SceneBody {
 /// Shapes and feature of a contact point.
 type PointName = (u32, u32, u32);
 
-/// State of every body of a problem: center, and cosine and sine of its rotation.
-fn poses(world: &World) -> Vec<[f64; 4]> {
+/// Centers and angles, and velocities of the bodies of a problem.
+fn state(world: &World) -> [Vec<Velocity>; 2] {
     let b = &world.bodies;
-    let moving = (0..b.len()).filter(|&i| b.inv_mass[i] > 0.0);
-    moving
-        .map(|i| [b.center(i)[0], b.center(i)[1], b.rotation_cos[i].into(), b.rotation_sin[i].into()])
-        .collect()
+    let place = |i: usize| [b.center(i)[0], b.center(i)[1], b.angle(i).into()];
+    let velocity = |i: usize| [b.velocity_x[i], b.velocity_y[i], b.angular_velocity[i]].map(f64::from);
+    let moving: Vec<usize> = (0..b.len()).filter(|&i| b.inv_mass[i] > 0.0).collect();
+    [moving.iter().map(|&i| place(i)).collect(), moving.iter().map(|&i| velocity(i)).collect()]
 }
 
-/// Motion from one pose to another.
-fn moves(from: &[[f64; 4]], to: &[[f64; 4]]) -> Vec<Velocity> {
-    let turn = |a: &[f64; 4], b: &[f64; 4]| (a[2] * b[3] - a[3] * b[2]).atan2(a[2] * b[2] + a[3] * b[3]);
-    from.iter().zip(to).map(|(a, b)| [b[0] - a[0], b[1] - a[1], turn(a, b)]).collect()
+/// Every contact point, with its contact.
+fn points(world: &World) -> impl Iterator<Item = (&Contact, &ManifoldPoint)> {
+    world.contacts.iter().flat_map(|c| c.manifold.points().iter().map(move |p| (c, p)))
+}
+
+/// Sets the targets of points that bounce in their rows. Returns those that bounce at the end of the step, with their
+/// rebound speeds (m/s).
+fn bounce(problem: &mut ContactProblem, world: &World, law: ImpactLaw, inward: bool) -> Vec<(usize, f64)> {
+    let (mut ends, [_, velocities]) = (Vec::new(), state(world));
+    for (i, (c, (on, _))) in problem.contacts.iter_mut().zip(points(world)).enumerate() {
+        let (v, e) = (c.velocity(&velocities)[0], f64::from(on.restitution));
+        let target = if inward { e * v } else { -e * v };
+        match law {
+            ImpactLaw::Bias if -v > RESTITUTION_THRESHOLD.into() && -v * problem.h > c.gap => {
+                c.rebound = target
+            }
+            // In these scenes, all points that bounce are new.
+            ImpactLaw::EndPass { threshold, .. } if e > 0.0 && -v > threshold.into() => {
+                ends.push((i, target))
+            }
+            _ => {}
+        }
+    }
+    ends
 }
 
 impl Story {
-    /// The largest distance from the method in three steps (1); zero if the solver is not compared.
-    pub fn apart(&self, variant: &'static Variant, fault: Option<Fault>) -> f64 {
-        let of = against(variant.name).unwrap();
-        let (method, many) = match of {
-            Against::Method(method) => (method, false),
-            Against::Solution(method) => (method, true),
-        };
-        if !(self.takes)(variant) {
-            return 0.0;
-        }
-        let substeps = if variant.impacts == ImpactLaw::Bias { 1 } else { variant.budget.substeps.min(2) };
-        let budget = Budget { substeps, ..if many { variant.of_iterations(MANY) } else { variant.budget } };
+    /// The scene under a solver, with a step of one substep.
+    fn world(&self, variant: &'static Variant) -> World {
+        let is_solution = matches!(against(variant.name), Some(Against::Solution(_)));
+        let whole = if is_solution { variant.of_iterations(MANY) } else { variant.budget };
+        let velocity_iterations = whole.velocity_iterations.min(most(variant.name));
         let settings = Settings {
             order: Order::Natural,
             frozen: self.freezing,
             without: left_out(variant),
-            budget,
-            continuous: false,
+            budget: Budget { substeps: 1, velocity_iterations, ..whole },
             ..Settings::new(variant)
         };
         let (bodies, joints) = (self.scene)();
         let ground = SceneBody::fixed([0.0, -1.0], SceneShape::rectangle(50.0, 1.0).friction(0.4));
         let bodies = std::iter::once(ground).chain(bodies).collect();
-        let mut world = Scene::new(self.name, bodies).joined(joints).build(settings).unwrap();
+        Scene::new(self.name, bodies).joined(joints).build(settings).unwrap()
+    }
+
+    /// The largest distance from the method in three steps (1); zero if the solver is not compared.
+    pub fn apart(&self, variant: &'static Variant, fault: Option<Fault>) -> f64 {
+        if !(self.takes)(variant) {
+            return 0.0;
+        }
+        let of = against(variant.name).unwrap();
+        let (Against::Method(method) | Against::Solution(method)) = of;
+        let mut world = self.world(variant);
+        // Impulses of every point, and its drift since it began to stick (m).
         let mut kept: HashMap<PointName, (DPair, f64)> = HashMap::new();
-        let (mut of_joints, mut steepness, mut worst) = (Vec::new(), 0.0, 0.0);
-        let mut first: Option<(ContactProblem, Vec<[f64; 4]>)> = None;
-        // The first step of `avbd` is its whole method here: penalties are not kept.
+        let (mut of_joints, mut steepness, mut worst, mut first) = (Vec::new(), 0.0, 0.0, None);
+        // Penalties of `avbd` are not kept: its first step is compared alone.
         for _ in 0..if variant.name == "avbd" { 1 } else { 3 } {
-            let before = poses(&world);
+            let before = state(&world)[0].clone();
             let mut problem = capture(&mut world, self.name);
-            let share = 1.0 / f64::from(substeps);
-            problem.h *= share;
-            for b in &mut problem.bodies {
-                b.free_velocity =
-                    [0, 1, 2].map(|k| b.velocity[k] + share * (b.free_velocity[k] - b.velocity[k]));
-            }
             if self.freezing != Freezing::Off {
                 let (first, then) = first.get_or_insert_with(|| (problem.clone(), before.clone()));
-                thaw_not(&mut problem.contacts, first, moves(then, &before));
+                freeze(&mut problem.contacts, first, minus(&before, then));
             }
-            let points =
-                || world.contacts.iter().flat_map(|c| c.manifold.points().iter().map(move |p| (c, p)));
-            let names: Vec<PointName> = points().map(|(c, p)| (c.shape_a, c.shape_b, p.feature_id)).collect();
-            let velocities: Vec<Velocity> = problem.bodies.iter().map(|b| b.velocity).collect();
-            let mut ends = Vec::new();
-            for (i, (c, _)) in points().enumerate() {
-                let (v, e) = (problem.contacts[i].velocity(&velocities)[0], f64::from(c.restitution));
-                let sign = if fault == Some(Fault::Inward) { -1.0 } else { 1.0 };
-                let carried = kept.get(&names[i]).is_some_and(|(l, _)| l[0] > 0.0);
-                match variant.impacts {
-                    ImpactLaw::Bias => {
-                        let hits =
-                            -v > RESTITUTION_THRESHOLD.into() && -v * problem.h > problem.contacts[i].gap;
-                        problem.contacts[i].rebound = if hits { -sign * e * v } else { 0.0 };
-                    }
-                    ImpactLaw::EndPass { threshold, only_new }
-                        if -v > threshold.into() && !(only_new && carried && e < 1.0) =>
-                    {
-                        ends.push((i, -e * v));
-                    }
-                    _ => {}
-                }
-            }
-            let start = names.iter().map(|name| kept.get(name).map_or([0.0; 2], |(l, _)| *l));
+            let ends = bounce(&mut problem, &world, variant.impacts, fault == Some(Fault::Inward));
+            let name = |(c, p): (&Contact, &ManifoldPoint)| (c.shape_a, c.shape_b, p.feature_id);
+            let names: Vec<PointName> = points(&world).map(name).collect();
+            let last: Vec<_> = names.iter().map(|name| kept.get(name).copied().unwrap_or_default()).collect();
             of_joints.resize(problem.joint_rows(), [0.0; 2]);
-            let start: Vec<DPair> = start.chain(of_joints).collect();
+            let start = last.iter().map(|last| last.0).chain(of_joints).collect();
             let rate = f64::from(variant.defaults()[0]) / problem.h;
             let rows = problem.joints.iter().flat_map(|joint| joint.rows());
             let rows = rows.map(|row| OwnRow { bias: rate * row.error, compliance: 0.0 });
             let own: Vec<OwnRow> = names.iter().map(|_| OwnRow::default()).chain(rows).collect();
-            let drifts = names.iter().map(|name| kept.get(name).map_or(0.0, |(_, drift)| *drift)).collect();
-            let state = KeptState { drifts, steepness };
-            let run = Run { variant, budget, undo: None, fault, kept: state.into() };
+            let state_before = KeptState { drifts: last.iter().map(|last| last.1).collect(), steepness };
+            let budget = world.settings.budget;
+            let run = Run { variant, budget, undo: None, fault, kept: state_before.into() };
             let mut model = Model::new(&problem, Target::Own(&own), start);
             method(&mut model, &run);
-            let state = run.kept.into_inner();
-            steepness = state.steepness;
             rebound_at_end(&mut model, &ends);
             let source = ModelState { v: model.v, x: model.x, l: model.l };
-            kept.clear();
-            for (i, name) in names.iter().enumerate() {
-                let part = if fault == Some(Fault::HalfStored) { 0.5 } else { 1.0 };
-                let drift = if fault == Some(Fault::NoAnchors) {
-                    0.0
-                } else {
-                    state.drifts.get(i).copied().unwrap_or(0.0)
-                };
-                kept.insert(*name, (source.l[i].map(|l| part * l), drift));
-            }
-            of_joints = source.l[names.len()..].to_vec();
+            let stored = if fault == Some(Fault::HalfStored) { 0.5 } else { 1.0 };
+            let anchored = if fault == Some(Fault::NoAnchors) { 0.0 } else { 1.0 };
+            let now = run.kept.into_inner();
+            let point = |i: usize| (source.l[i].map(|l| stored * l), anchored * now.drifts[i]);
+            kept = names.iter().enumerate().map(|(i, name)| (*name, point(i))).collect();
+            (of_joints, steepness) = (source.l[names.len()..].to_vec(), now.steepness);
             world.step().unwrap();
-            let impulse = |p: &[f32; 2]| p.map(f64::from);
-            let mut l: Vec<DPair> = (world.contacts.iter())
-                .flat_map(|c| {
-                    c.manifold.points().iter().map(|p| impulse(&[p.normal_impulse, p.tangent_impulse]))
-                })
-                .collect();
-            let b = &world.bodies;
-            let v = (0..b.len()).filter(|&i| b.inv_mass[i] > 0.0);
-            let v =
-                v.map(|i| [b.velocity_x[i], b.velocity_y[i], b.angular_velocity[i]].map(f64::from)).collect();
-            let x = moves(&before, &poses(&world));
-            l.extend(
-                capture(&mut world, "next")
-                    .warm_impulses()
-                    .split_off(world.contacts.iter().map(|c| c.manifold.points().len()).sum()),
-            );
-            let (here, time) = (ModelState { v, x, l }, problem.h * f64::from(substeps));
-            worst = worse(
-                worst,
-                distance(&problem, time, &here, &source, &determined(&problem, variant.name, of)),
-            );
+            let impulses =
+                |(_, p): (&Contact, &ManifoldPoint)| [p.normal_impulse, p.tangent_impulse].map(f64::from);
+            let mut l: Vec<DPair> = points(&world).map(impulses).collect();
+            let [x, v] = state(&world);
+            // Those of joints are in the next problem.
+            let next = capture(&mut world, self.name);
+            l.extend(next.warm_impulses().split_off(next.contacts.len()));
+            let here = ModelState { v, x: minus(&x, &before), l };
+            let determined = determined(&problem, variant.name, of);
+            worst = worse(worst, distance(&problem, problem.h, &here, &source, &determined));
         }
         worst
     }
 }
 
 /// The law of frozen contacts: the normals and arms of the first step, and gaps that follow the bodies.
-fn thaw_not(contacts: &mut [ProblemContact], first: &ContactProblem, moved: Vec<Velocity>) {
+fn freeze(contacts: &mut [ProblemContact], first: &ContactProblem, moved: Vec<Velocity>) {
     let mut model = Model::new(first, Target::Rigid, first.no_impulses());
     model.x = moved;
     assert_eq!(contacts.len(), first.contacts.len());
@@ -223,5 +203,4 @@ fn rebound_at_end(model: &mut Model, ends: &[(usize, f64)]) {
             model.set(i, 0, &rows, new);
         }
     }
-    let _ = (ScalarRule::Rebound, ScalarSweep::new(0));
 }

@@ -5,8 +5,9 @@ use super::methods::{CAP, Fault, Run, rebound};
 use super::rules::ScalarRule;
 use simpulse::engine::constraints::numerics::matrix::solve_in_place;
 use simpulse::lab::reference::iterate::{Acceleration, Anderson, ConjugateSweeps, dot, plus};
-use simpulse::lab::reference::oracle::{GapRule, ScalarSweep, SidesOfPoint};
-use simpulse::lab::reference::{DPair, Velocity};
+use simpulse::lab::reference::oracle::{GapRule, ScalarSweep};
+use simpulse::lab::reference::problem::minus;
+use simpulse::lab::reference::{ContactProblem, DPair, ProblemContact};
 
 /// Sweeps with an extrapolation after each; with `plain`, not after the last.
 fn accelerated(model: &mut Model, run: &Run, mut by: impl Acceleration, plain: bool) {
@@ -48,30 +49,60 @@ fn project_cone(mu: f64, [ln, lt]: DPair) -> DPair {
     }
 }
 
-/// u = J v(λ) + b of contacts, then of the rows of rigid joints, whose second entries are zero.
+/// Rows of J over the velocities of all bodies, two for every pair of impulses; zero for the second of a joint row.
+pub(super) fn jacobian(problem: &ContactProblem) -> Vec<Vec<f64>> {
+    let none = problem.no_impulses();
+    let masses = problem.bodies.iter().flat_map(|b| b.inverse()).map(|i| if i > 0.0 { 1.0 / i } else { 0.0 });
+    let masses: Vec<f64> = masses.collect();
+    let row = |at: usize| {
+        let mut unit = none.clone();
+        unit[at / 2][at % 2] = 1.0;
+        let pushed = minus(&problem.velocities(&unit), &problem.velocities(&none));
+        pushed.concat().iter().zip(&masses).map(|(v, m)| v * m).collect()
+    };
+    (0..2 * none.len()).map(row).collect()
+}
+
+/// K = J M⁻¹ Jᵀ.
+pub(super) fn couplings(problem: &ContactProblem) -> Vec<Vec<f64>> {
+    let (rows, inverse) = (jacobian(problem), problem.bodies.iter().flat_map(|b| b.inverse()));
+    let inverse: Vec<f64> = inverse.collect();
+    let entry = |a: &[f64], b: &[f64]| (0..a.len()).map(|k| a[k] * inverse[k] * b[k]).sum();
+    rows.iter().map(|a| rows.iter().map(|b| entry(a, b)).collect()).collect()
+}
+
+fn inner(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// u = J v(λ) + b of contacts and of the rows of rigid joints, and effective masses D.
 struct VectorLaw {
+    rows: Vec<Vec<f64>>,
     bias: Vec<f64>,
-    /// Effective masses D (kg).
     mass: Vec<DPair>,
     /// µ; `None` for a row of a joint, which has no bounds.
     friction: Vec<Option<f64>>,
-    /// J of joint rows on their bodies.
-    joints: Vec<Vec<(usize, Velocity)>>,
 }
 
 impl VectorLaw {
     /// With `alike`, D of a point is the same along n and t.
     fn new(model: &Model, run: &Run, alike: bool) -> Self {
-        let (contacts, rule) = (&model.problem.contacts, run.baumgarte());
-        let push = |i: usize| match contacts[i].rebound {
+        let (problem, rule) = (model.problem, run.baumgarte());
+        let push = |(i, c): (usize, &ProblemContact)| match c.rebound {
             0.0 => rule.line(model, i).push,
             u => -u,
         };
-        let mass = |i: usize| {
-            let [n, t] = [0, 1].map(|axis| model.mass(&model.rows(i, false), axis));
+        let rate = run.get("baumgarte") / model.h;
+        let joints = problem.joints.iter().flat_map(|joint| joint.rows());
+        let bias = problem.contacts.iter().enumerate().map(push).chain(joints.map(|row| rate * row.error));
+        let friction = problem.contacts.iter().map(|c| Some(c.friction));
+        let friction: Vec<_> = friction.chain((0..problem.joint_rows()).map(|_| None)).collect();
+        let k = couplings(problem);
+        let mass = |(i, mu): (usize, &Option<f64>)| {
+            let [n, t] = [2 * i, 2 * i + 1].map(|r| 1.0 / k[r][r]);
             [
                 n,
-                if contacts[i].friction == 0.0 {
+                if mu.is_none_or(|mu| mu == 0.0) {
                     0.0
                 } else if alike {
                     n
@@ -80,34 +111,15 @@ impl VectorLaw {
                 },
             ]
         };
-        let mut law = VectorLaw {
-            bias: (0..contacts.len()).map(push).collect(),
-            mass: (0..contacts.len()).map(mass).collect(),
-            friction: contacts.iter().map(|c| Some(c.friction)).collect(),
-            joints: Vec::new(),
-        };
-        for (joint, row) in model.problem.joints.iter().flat_map(|j| j.rows().map(move |row| (j, row))) {
-            let side = |body: Option<u32>, sign: f64, arm: f64| {
-                body.map(|b| (b as usize, [row.axis[0], row.axis[1], arm].map(|x| sign * x)))
-            };
-            let sides = [side(joint.body_a, -1.0, row.arm_a), side(joint.body_b, 1.0, row.arm_b)];
-            let sides: Vec<(usize, Velocity)> = sides.into_iter().flatten().collect();
-            let k =
-                |(b, j): &(usize, Velocity)| (0..3).map(|c| model.inverse[*b][c] * j[c] * j[c]).sum::<f64>();
-            law.mass.push([1.0 / sides.iter().map(k).sum::<f64>(), 0.0]);
-            law.bias.push(run.get("baumgarte") / model.h * row.error);
-            law.friction.push(None);
-            law.joints.push(sides);
-        }
-        law
+        let mass = friction.iter().enumerate().map(mass).collect();
+        VectorLaw { rows: jacobian(problem), bias: bias.collect(), mass, friction }
     }
 
     fn speeds(&self, model: &mut Model, at: &[DPair]) -> Vec<DPair> {
         model.jump(at);
-        let along = |(b, j): &(usize, Velocity)| (0..3).map(|c| j[c] * model.v[*b][c]).sum::<f64>();
-        let joints = self.joints.iter().map(|sides| [sides.iter().map(along).sum(), 0.0]);
-        let contacts = model.problem.contact_velocities(&model.v).into_iter();
-        contacts.chain(joints).zip(&self.bias).map(|(u, b)| [u[0] + b, u[1]]).collect()
+        let v = model.v.concat();
+        let rows = self.rows.chunks_exact(2).zip(&self.bias);
+        rows.map(|(j, b)| [inner(&j[0], &v) + b, inner(&j[1], &v)]).collect()
     }
 
     /// Applies the projection of a point to all points.
@@ -115,23 +127,15 @@ impl VectorLaw {
         l.iter().zip(&self.friction).map(|(&l, mu)| mu.map_or(l, |mu| project(mu, l))).collect()
     }
 
-    /// D x, or with `inverse` D⁻¹ x, without entries that have no mass.
-    fn scaled(&self, x: &[DPair], inverse: bool) -> Vec<DPair> {
-        let entry = |x: f64, m: f64| {
-            if !inverse {
-                m * x
-            } else if m > 0.0 {
-                x / m
-            } else {
-                0.0
-            }
-        };
-        x.iter().zip(&self.mass).map(|(x, m)| [entry(x[0], m[0]), entry(x[1], m[1])]).collect()
+    /// D x.
+    fn scaled(&self, x: &[DPair]) -> Vec<DPair> {
+        x.iter().zip(&self.mass).map(|(x, m)| [m[0] * x[0], m[1] * x[1]]).collect()
     }
 
-    /// |x|² in the norm of D⁻¹.
+    /// |x|² in the norm of D⁻¹, over entries that have a mass.
     fn square(&self, x: &[DPair]) -> f64 {
-        dot(x, &self.scaled(x, true))
+        let entries = x.iter().flatten().zip(self.mass.iter().flatten());
+        entries.filter(|(_, m)| **m > 0.0).map(|(x, m)| x * x / m).sum()
     }
 }
 
@@ -154,7 +158,7 @@ pub(super) fn apgd(model: &mut Model, run: &Run) {
         let mut next;
         let mut tries = 0;
         loop {
-            next = law.within(&plus(&y, -1.0 / steepness, &law.scaled(&g, false)), project_cone);
+            next = law.within(&plus(&y, -1.0 / steepness, &law.scaled(&g)), project_cone);
             let step = plus(&next, -1.0, &y);
             let curve = dot(&step, &plus(&law.speeds(model, &next), -1.0, &g));
             tries += 1;
@@ -200,7 +204,7 @@ fn descend(
     let (mut best, mut value, mut least, mut length) = (now.clone(), 0.0, 0.0, 1.0_f64);
     let mut values = vec![0.0];
     for k in 1..=count {
-        let mut next = law.within(&plus(&now, -length, &law.scaled(&g, false)), project);
+        let mut next = law.within(&plus(&now, -length, &law.scaled(&g)), project);
         let d = plus(&next, -1.0, &now);
         let way = law.square(&d);
         if way <= (1e-7 * length.max(1.0)).powi(2) * law.square(&now) {
@@ -227,7 +231,7 @@ fn descend(
         length = match () {
             () if fixed || curve <= 0.0 => 1.0,
             () if k % 2 == 1 => way / curve,
-            () => curve / dot(&change, &law.scaled(&change, false)),
+            () => curve / dot(&change, &law.scaled(&change)),
         };
         length = length.min(1e4);
         (now, g) = (next, after);
@@ -259,52 +263,42 @@ pub(super) fn staggered(model: &mut Model, run: &Run) {
     model.advance();
 }
 
-/// K + C⁻¹ is that of impulses, (1 + C K) λ = target − C (J v* + b), so that C may be zero.
+/// In the space of impulses, where C may be zero: (1 + C K) λ = target − C (J v* + b).
 pub(super) fn admm(model: &mut Model, run: &Run) {
     model.accelerate();
     let none = vec![[0.0; 2]; model.l.len()];
     let start = std::mem::replace(&mut model.l, none.clone());
     let law = VectorLaw::new(model, run, true);
-    let free = law.speeds(model, &none);
-    let columns: Vec<Vec<f64>> = (0..2 * none.len())
-        .map(|j| {
-            let mut unit = none.clone();
-            unit[j / 2][j % 2] = 1.0;
-            let mut column = plus(&law.speeds(model, &unit), -1.0, &free).into_flattened();
-            if run.makes(Fault::Uncoupled) {
-                column.iter_mut().enumerate().filter(|(i, _)| *i != j).for_each(|(_, k)| *k = 0.0);
-            }
-            column
-        })
-        .collect();
-    let shifted = |u: &[DPair]| -> Vec<DPair> {
-        let slide = |(u, mu): (&DPair, &Option<f64>)| [u[0] + mu.unwrap_or(0.0) * u[1].abs(), u[1]];
-        u.iter().zip(&law.friction).map(slide).collect()
+    let (free, k) = (law.speeds(model, &none), couplings(model.problem));
+    let coupled = |i: usize, j: usize| if i != j && run.makes(Fault::Uncoupled) { 0.0 } else { k[i][j] };
+    // D (u + (µ |ut|, 0)) and D (µ |ut|, 0)
+    let slide = |u: &[DPair], whole: f64| {
+        let one =
+            |(u, mu): (&DPair, &Option<f64>)| [whole * u[0] + mu.unwrap_or(0.0) * u[1].abs(), whole * u[1]];
+        law.scaled(&u.iter().zip(&law.friction).map(one).collect::<Vec<DPair>>())
     };
-    let (mut rho, every) = (run.get("penalty"), run.get("adapt_every") as u32);
+    let (mut rho, every, count) =
+        (run.get("penalty"), run.get("adapt_every") as u32, run.budget.velocity_iterations);
     let (mut z, mut u) = (start.clone(), law.speeds(model, &start));
-    let x = plus(&z, -1.0, &law.scaled(&shifted(&u), false));
+    let x = plus(&z, -1.0, &slide(&u, 1.0));
     let mut w = plus(&x, -1.0, &law.within(&x, project_cone));
     w.iter_mut().flatten().for_each(|w| *w /= rho);
-    for k in 1..=run.budget.velocity_iterations {
-        let c: Vec<f64> = law.mass.iter().flatten().map(|m| m / rho).collect();
-        let slide = law.scaled(&plus(&shifted(&u), -1.0, &u), false);
-        let target = plus(&plus(&z, -1.0, &w), -1.0 / rho, &slide);
-        let mut b = plus(&target, -1.0 / rho, &law.scaled(&free, false)).into_flattened();
-        let entry = |i: usize, j: usize| c[i] * columns[j][i] + if i == j { 1.0 } else { 0.0 };
-        let mut a: Vec<f64> = (0..b.len() * b.len()).map(|at| entry(at / b.len(), at % b.len())).collect();
-        assert!(solve_in_place(&mut a, &mut b, 0.0));
-        let l: Vec<DPair> = b.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
+    for step in 1..=count {
+        let target = plus(&plus(&z, -1.0, &w), -1.0 / rho, &slide(&u, 0.0));
+        let mut l = plus(&target, -1.0 / rho, &law.scaled(&free)).into_flattened();
+        let (n, mass) = (l.len(), law.mass.as_flattened());
+        let entry = |i: usize, j: usize| mass[i] / rho * coupled(i, j) + if i == j { 1.0 } else { 0.0 };
+        let mut a: Vec<f64> = (0..n * n).map(|at| entry(at / n, at % n)).collect();
+        assert!(solve_in_place(&mut a, &mut l, 0.0));
+        let l: Vec<DPair> = l.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
         u = law.speeds(model, &l);
         let (both, old) = (plus(&l, 1.0, &w), z);
         z = law.within(&both, project_cone);
         w = plus(&both, -1.0, &z);
-        if every == 0 || k % every != 0 || k + every > run.budget.velocity_iterations {
-            continue;
-        }
         let primal = law.square(&plus(&l, -1.0, &z));
         let dual = rho * rho * law.square(&plus(&z, -1.0, &old));
-        if primal.max(dual) > 1e-10 * law.square(&z) {
+        let adapts = every > 0 && step % every == 0 && step + every <= count;
+        if adapts && primal.max(dual) > 1e-10 * law.square(&z) {
             let change = ((primal / dual).sqrt() / 30.0).sqrt().clamp(1.0 / 30.0, 30.0);
             let next = (rho * change).clamp(1e-4_f64.min(rho), 1.0_f64.max(rho));
             if !(0.1..=10.0).contains(&(next / rho)) {
@@ -317,33 +311,23 @@ pub(super) fn admm(model: &mut Model, run: &Run) {
     model.advance();
 }
 
-/// Newton's method on ℓ(v) = ½ |v − v*|²_M + ½ Σ γᵀ R γ (`castro2022`, equations in `sap/convex.rs`), from the
-/// velocities of the last step.
+/// Newton's method on ℓ(v) = ½ |v − v*|²_M + ½ Σ γᵀ R γ (`castro2022`), from the velocities of the last step. A point
+/// at e = v̂ − J v sticks, slides or is open, with γ = R⁻¹ e, its nearest point of an edge, or zero.
 pub(super) fn sap(model: &mut Model, run: &Run) {
     let mut v = model.v.concat();
     model.accelerate();
-    let free = model.v.concat();
-    let inverse = model.inverse.concat();
-    let mass: Vec<f64> = inverse.iter().map(|&i| if i > 0.0 { 1.0 / i } else { 1.0 }).collect();
+    let (free, rows, k) = (model.v.concat(), jacobian(model.problem), couplings(model.problem));
+    let mass: Vec<f64> =
+        model.inverse.concat().iter().map(|&i| if i > 0.0 { 1.0 / i } else { 1.0 }).collect();
     let rule = ScalarRule::Baumgarte(run.get("baumgarte"), 0.0, CAP);
+    let push: Vec<f64> = (0..model.l.len()).map(|i| rule.line(model, i).push).collect();
     let soft = ["softness", "tangent_softness"].map(|name| run.get(name));
-    let n = v.len();
-    let rows: Vec<SidesOfPoint> = (0..model.l.len()).map(|i| model.rows(i, false)).collect();
-    let push: Vec<f64> = (0..rows.len()).map(|i| rule.line(model, i).push).collect();
-    let speed = |i: usize, v: &[f64]| {
-        let mut u = [0.0; 2];
-        for (b, j) in rows[i].iter().flatten() {
-            (0..6).for_each(|k| u[k / 3] += j[k / 3][k % 3] * v[3 * b + k % 3]);
-        }
-        u
-    };
-    // γ and G of a point at e = v̂ − J v.
-    let point = |i: usize, u: DPair| -> (DPair, [DPair; 2]) {
-        let (e, mu) = ([-push[i] - u[0], -u[1]], model.problem.contacts[i].friction);
-        let r = [0, 1].map(|axis| soft[axis] / model.mass(&rows[i], axis));
-        let y = [e[0] / r[0], e[1] / r[1]];
+    let point = |i: usize, v: &[f64]| -> (DPair, [DPair; 2]) {
+        let e = [-push[i] - inner(&rows[2 * i], v), -inner(&rows[2 * i + 1], v)];
+        let mu = model.problem.contacts[i].friction;
+        let r = [0, 1].map(|axis| soft[axis] * k[2 * i + axis][2 * i + axis]);
+        let (y, w) = ([e[0] / r[0], e[1] / r[1]], [1.0, mu.copysign(e[1])]);
         let across = r[0] + mu * mu * r[1];
-        let w = [1.0, mu.copysign(e[1])];
         let along = (e[0] + w[1] * e[1]) / across;
         match () {
             () if y[0] >= 0.0 && y[1].abs() <= mu * y[0] => (y, [[1.0 / r[0], 0.0], [0.0, 1.0 / r[1]]]),
@@ -351,49 +335,36 @@ pub(super) fn sap(model: &mut Model, run: &Run) {
             () => ([0.0; 2], [[0.0; 2]; 2]),
         }
     };
+    let (n, points) = (v.len(), push.len());
     let gradient = |v: &[f64]| {
-        let mut g: Vec<f64> = (0..n).map(|k| mass[k] * (v[k] - free[k])).collect();
-        for (i, rows) in rows.iter().enumerate() {
-            let (gamma, _) = point(i, speed(i, v));
-            for (b, j) in rows.iter().flatten() {
-                (0..6).for_each(|k| g[3 * b + k % 3] -= j[k / 3][k % 3] * gamma[k / 3]);
-            }
-        }
-        g
+        let loads: Vec<f64> = (0..points).flat_map(|i| point(i, v).0).collect();
+        let pushed = |c: usize| rows.iter().zip(&loads).map(|(j, l)| j[c] * l).sum::<f64>();
+        (0..n).map(|c| mass[c] * (v[c] - free[c]) - pushed(c)).collect::<Vec<f64>>()
     };
     for _ in 0..run.budget.velocity_iterations {
-        let g = gradient(&v);
         let mut h = vec![0.0; n * n];
-        (0..n).for_each(|k| h[k * n + k] = mass[k]);
-        for (i, rows) in rows.iter().enumerate() {
-            let (_, stiff) = point(i, speed(i, &v));
-            for ((a, p), (b, q)) in
-                rows.iter().flatten().flat_map(|a| rows.iter().flatten().map(move |b| (a, b)))
-            {
-                for (r, c) in (0..9).map(|k| (k / 3, k % 3)) {
-                    let sum = |k: usize| p[k / 2][r] * stiff[k / 2][k % 2] * q[k % 2][c];
-                    h[(3 * a + r) * n + 3 * b + c] += (0..4).map(sum).sum::<f64>();
-                }
-            }
+        (0..n).for_each(|c| h[c * n + c] = mass[c]);
+        for (i, (p, q)) in (0..points).flat_map(|i| [(0, 0), (0, 1), (1, 0), (1, 1)].map(|pair| (i, pair))) {
+            let stiff = point(i, &v).1[p][q];
+            (0..n * n).for_each(|at| h[at] += rows[2 * i + p][at / n] * stiff * rows[2 * i + q][at % n]);
         }
-        let mut d: Vec<f64> = g.iter().map(|g| -g).collect();
-        if !solve_in_place(&mut h, &mut d, 0.0) {
-            break;
-        }
+        let mut d: Vec<f64> = gradient(&v).iter().map(|g| -g).collect();
+        assert!(solve_in_place(&mut h, &mut d, 0.0));
         // The slope of ℓ along d rises: bisection finds its zero.
-        let at = |s: f64| -> Vec<f64> { v.iter().zip(&d).map(|(v, d)| v + s * d).collect() };
-        let slope = |s: f64| gradient(&at(s)).iter().zip(&d).map(|(g, d)| g * d).sum::<f64>();
-        let (mut low, mut high) = (0.0, 1.0);
-        while slope(high) < 0.0 && high < 1e6 {
+        let at = |s: f64| v.iter().zip(&d).map(|(v, d)| v + s * d).collect::<Vec<f64>>();
+        let rises = |s: f64| inner(&gradient(&at(s)), &d) >= 0.0;
+        let mut high = 1.0;
+        while !rises(high) && high < 1e6 {
             high *= 2.0;
         }
+        let mut low = 0.0;
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
-            if slope(middle) < 0.0 { low = middle } else { high = middle }
+            (low, high) = if rises(middle) { (low, middle) } else { (middle, high) };
         }
         v = at(high);
     }
-    model.l = (0..rows.len()).map(|i| point(i, speed(i, &v)).0).collect();
+    model.l = (0..points).map(|i| point(i, &v).0).collect();
     model.v = v.chunks_exact(3).map(|v| [v[0], v[1], v[2]]).collect();
     model.advance();
 }
