@@ -205,10 +205,7 @@ pub fn treatment_tables(records: &[Record]) -> Vec<DocTable> {
 
 /// That of frozen contacts.
 pub fn frozen_table(records: &[Record]) -> Option<DocTable> {
-    treatments("frozen contacts", records, |r| match r.frozen.to_string() {
-        limits if limits == "off" => "fresh".to_string(),
-        limits => limits,
-    })
+    treatments("frozen contacts", records, |r| r.frozen.to_string().replace("off", "fresh"))
 }
 
 /// Such a table; a line per solver and value. Scenes on which a solver ran with one value only are left out.
