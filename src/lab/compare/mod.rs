@@ -19,7 +19,7 @@ pub mod solvers;
 pub mod text;
 
 use crate::engine::world::Order;
-use crate::lab::report::study_file::StudyFile;
+use crate::lab::report::study_file::{StudyFile, differing_settings};
 use crate::lab::scenes::holds::Mark;
 use crate::lab::study::Record;
 use crate::lab::study::compare::Ratio;
@@ -401,21 +401,11 @@ fn differences(before: &StudyFile, after: &StudyFile) -> Vec<String> {
     differ("compiler", a.compiler.clone(), b.compiler.clone());
     differ("version", a.version.clone(), b.version.clone());
     differ("commit", a.commit.clone(), b.commit.clone());
-    let empty = serde_json::Map::new();
-    let [a, b] = [before, after].map(|study| study.settings.as_object().unwrap_or(&empty));
-    let mut names: Vec<&String> = a.keys().chain(b.keys()).collect();
-    names.sort();
-    names.dedup();
-    for name in names.into_iter().filter(|name| *name != "scenes") {
-        let text = |map: &serde_json::Map<String, serde_json::Value>| {
-            map.get(name).map_or("–".to_string(), ToString::to_string)
-        };
-        let short = |text: String| if text.chars().count() > 80 { "…".to_string() } else { text };
-        let (a, b) = (text(a), text(b));
+    for (name, [a, b]) in differing_settings(&before.settings, &after.settings) {
         match a == b {
-            true => {}
-            false if short(a.clone()) == short(b.clone()) => found.push(format!("{name}: differs")),
-            false => found.push(format!("{name}: {} → {}", short(a), short(b))),
+            _ if name == "scenes" => {}
+            true => found.push(format!("{name}: differs")),
+            false => found.push(format!("{name}: {a} → {b}")),
         }
     }
     found
