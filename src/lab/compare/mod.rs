@@ -10,10 +10,11 @@
 //! Two runs of one binary differ as well, by memory placement, clock rate and load. The measurable part of
 //! this widens every interval ([`Noise`]): a fixed loop, timed between the rounds, measures the speed of the
 //! machine; the scatter of the settings around their common ratio measures the rest, and it is widened so
-//! that the largest of all settings stays within it. If the threads had to wait, other programs ran, and
-//! these slow all settings of a scene alike for as long as it is timed: by a third where they share a core's
-//! units and caches. Times are then divided by the median ratio of their scene. A change of one solver shows in all its settings, so it
-//! is detected even below that noise ([`solvers`]).
+//! that the largest of all settings stays within it. Other programs slow all settings of a scene alike for as
+//! long as it is timed: by a third where they share a core's units and caches. So a scene's median ratio is divided
+//! out if it differs from those of the other scenes by no more than they do from one another, and always if
+//! threads had to wait. A change of one solver shows in all its settings, so it is detected even below that
+//! noise ([`solvers`]).
 
 pub mod solvers;
 pub mod text;
@@ -289,9 +290,7 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &CompareOptions) 
     }
     let solvers = solvers::changes(&pairs);
     let busy = [before, after].into_iter().any(|study| mean(study, |s| s.waited) > BUSY);
-    if busy {
-        divide_out_scenes(&mut pairs);
-    }
+    divide_out_scenes(&mut pairs, busy);
     let noise = noise(before, after, &pairs);
     for time in pairs.iter_mut().filter_map(|p| p.time.as_mut()) {
         time.ratio /= noise.machine;
@@ -321,15 +320,26 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &CompareOptions) 
     }
 }
 
-/// Divides times by the median ratio of their scene.
-fn divide_out_scenes(pairs: &mut [SettingPair]) {
+/// Divides times by the median ratio of their scene if the machine was `busy`. Otherwise by its ratio to the
+/// median over the scenes, unless that is beyond the noise between scenes: then the scene did change.
+fn divide_out_scenes(pairs: &mut [SettingPair], busy: bool) {
     let mut scenes: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for (scene, time) in pairs.iter().filter_map(|p| Some((&p.scene, p.time?))) {
         scenes.entry(scene.clone()).or_default().push(time.ratio);
     }
+    let scenes: BTreeMap<String, f64> =
+        scenes.into_iter().map(|(scene, ratios)| (scene, median(&ratios).ln())).collect();
+    let logs: Vec<f64> = scenes.values().copied().collect();
+    let (middle, chance) = match (busy, logs.len() < FEWEST) {
+        (true, _) => (0.0, f64::INFINITY),
+        (false, true) => return,
+        (false, false) => (median(&logs), PLACEMENT + scatter(&logs) * normal_quantile(logs.len())),
+    };
     for pair in pairs {
-        if let (Some(time), Some(ratios)) = (&mut pair.time, scenes.get(&pair.scene)) {
-            let common = median(ratios);
+        if let (Some(time), Some(log)) = (&mut pair.time, scenes.get(&pair.scene))
+            && (log - middle).abs() <= chance
+        {
+            let common = (log - middle).exp();
             time.ratio /= common;
             time.interval = time.interval.map(|bound| bound / common);
         }
@@ -563,6 +573,25 @@ mod tests {
         // Not everything is a tie.
         let found = compare(&run(0.4, 1.0, 1.0), &run(0.3, 1.3, 1.5), &STRICT);
         assert_eq!((worse(found.clone()), found.regressed()), (1, true));
+    }
+
+    #[test]
+    fn what_slows_one_scene_as_the_others_is_noise_and_what_slows_it_more_is_a_change() {
+        // Ten scenes of 40 settings. Spells of other programs scatter them by a tenth; one is slower by `slower`.
+        let run = |scatter: f64, slower: f64| {
+            let record = |scene: u32, i: u32| {
+                let spell = (scatter * (f64::from(scene * 7 % 11) - 5.0)).exp();
+                let time = 10.0 * spell * if scene == 3 { slower } else { 1.0 };
+                Record { scene: scene.to_string(), ..record(8, i, time, 1e-3) }
+            };
+            study((0..10).flat_map(|scene| (1..=40).map(move |i| record(scene, i))).collect())
+        };
+        let worse = |scatter: f64, slower: f64| {
+            let found = compare(&run(0.0, 1.0), &run(scatter, slower), &STRICT);
+            let verdicts = found.pairs.iter().map(|p| p.time.unwrap().verdict(0.1));
+            verdicts.filter(|v| *v == Verdict::Worse).count()
+        };
+        assert_eq!([worse(0.1, 1.0), worse(0.01, 1.0), worse(0.001, 1.5)], [0, 0, 40]);
     }
 
     #[test]
