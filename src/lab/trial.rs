@@ -22,7 +22,7 @@ use crate::engine::world::{Divergence, Settings, World};
 use crate::lab::error::Error;
 use crate::lab::interned::{self, Name};
 use crate::lab::metrics::{Errors, Observation};
-use crate::lab::scenes::holds::{Broken, Demand, HoldWatch};
+use crate::lab::scenes::holds::{Broken, Demand, SceneMonitor};
 use crate::lab::scenes::{Loaded, Scene, Truth};
 
 /// What is run, for how long, and what is measured.
@@ -86,7 +86,7 @@ impl<'a> Trial<'a> {
     pub fn run(self, observer: &mut dyn FnMut(&World) -> Result<(), Error>) -> Result<TrialOutcome, Error> {
         let Trial { scene, settings, demands, mut truth, steps, measured, until_broken } = self;
         let mut world = scene.build(settings)?;
-        let mut watch = HoldWatch::new(&world, demands);
+        let mut watch = SceneMonitor::new(&world, demands);
         let (mut observation, mut failure) = (None, None);
         observer(&world)?;
         for step in 0..steps {

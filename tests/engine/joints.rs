@@ -2,7 +2,7 @@
 
 use simpulse::engine::bodies::{BodyDef, BodyHandle, ShapeDef};
 use simpulse::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
-use simpulse::engine::constraints::joints::{JointType, Joints, Placing};
+use simpulse::engine::constraints::joints::{JointSetup, JointType, Joints};
 use simpulse::engine::joints::{Joint, JointHandle, JointKind};
 use simpulse::engine::lanes::{LaneWidth, Lanes};
 use simpulse::engine::solvers::{VARIANTS, Variant, find};
@@ -58,7 +58,7 @@ fn same_bits_at_every_width() {
 fn a_chain_hangs_together_under_every_solver_that_holds_joints() {
     for solver in VARIANTS {
         let (mut world, ground) = empty(solver);
-        if let Some(reason) = solver.holds_no_joints {
+        if let Some(reason) = solver.joints_unsupported {
             let body = BodyDef::dynamic([1.0, 0.0]).with(ShapeDef::circle(0.1).unwrap());
             let body = world.add_body(&body).unwrap();
             let error = world.add_joint(&Joint::revolute(ground, body)).unwrap_err().to_string();
@@ -687,7 +687,7 @@ impl JointType for Gear {
         1
     }
 
-    fn place(&self, _: (), _: Placing<'_>, numbers: &mut [f32]) {
+    fn place(&self, _: (), _: JointSetup<'_>, numbers: &mut [f32]) {
         numbers[0] = self.ratio;
     }
 
@@ -699,7 +699,7 @@ impl JointType for Gear {
 
 #[test]
 fn a_type_of_joint_from_outside_takes_part_under_every_solver() {
-    for solver in VARIANTS.iter().filter(|v| v.holds_no_joints.is_none()) {
+    for solver in VARIANTS.iter().filter(|v| v.joints_unsupported.is_none()) {
         let (mut world, ground) = empty(solver);
         let disc = |x: f64, spin: f64| {
             BodyDef::dynamic([x, 0.0]).with(ShapeDef::circle(0.5).unwrap()).with_angular_velocity(spin)

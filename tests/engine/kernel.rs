@@ -7,7 +7,7 @@ use simpulse::engine::coloring::{Coloring, EXEMPT};
 use simpulse::engine::constraints::kernels::velocity::rules::Rigid;
 use simpulse::engine::constraints::kernels::velocity::warm_start::warm_start;
 use simpulse::engine::constraints::{
-    Batches, Features, Kernel, Layout, NormalRule, OppositeKind, kernels::prepare, kernels::velocity::sweep,
+    Batches, Features, Kernel, Layout, NormalRule, PartnerKind, kernels::prepare, kernels::velocity::sweep,
 };
 use simpulse::engine::contacts::{Contact, Manifold, ManifoldPoint};
 use simpulse::engine::lanes::{BodyRow, Lanes};
@@ -67,7 +67,7 @@ fn setup() -> impl Strategy<Value = Setup> {
 fn batches(setup: &Setup, width: usize) -> Batches {
     let mut batches = Batches::default();
     batches.clear(width);
-    for (kind, opposite) in [(false, OppositeKind::Dynamic), (true, OppositeKind::Static)] {
+    for (kind, partner) in [(false, PartnerKind::Dynamic), (true, PartnerKind::Static)] {
         let members: Vec<u32> = (0..setup.contacts.len() as u32)
             .filter(|&i| (setup.contacts[i as usize].body_a < STATIC) == kind)
             .collect();
@@ -79,13 +79,13 @@ fn batches(setup: &Setup, width: usize) -> Batches {
         let mut coloring = Coloring::new();
         coloring.assign(&edges, BODIES);
         assert!(coloring.overflow().is_empty());
-        let layout = Layout::for_features(&Features::FULL, opposite);
+        let layout = Layout::for_features(&Features::FULL, partner);
         for color in 0..coloring.colors() {
             let contacts = coloring.color(color).iter().map(|&edge| {
                 let contact = &setup.contacts[members[edge as usize] as usize];
                 (members[edge as usize], [contact.body_a, contact.body_b])
             });
-            batches.push_segment(opposite, &layout, contacts, BODIES as u32);
+            batches.push_segment(partner, &layout, contacts, BODIES as u32);
         }
     }
     batches.reserve_buffer();
@@ -134,7 +134,7 @@ proptest! {
         prop_assert_eq!(&rows[..STATIC as usize], &[BodyRow::default(); STATIC as usize]);
         let floats: &[f32] = bytemuck::cast_slice(batches.records());
         for segment in batches.segments() {
-            let layout = Layout::for_features(&Features::FULL, segment.opposite);
+            let layout = Layout::for_features(&Features::FULL, segment.partner);
             for batch in 0..segment.batches {
                 for lane in segment.filled(batch, 16)..16 {
                     for vector in 0..layout.stride {

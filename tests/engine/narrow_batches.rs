@@ -43,10 +43,10 @@ impl Scene {
             let (a, b) = (2 * i as usize, 2 * i as usize + 1);
             (true, [a as u32, b as u32], [self.numbers[a], self.numbers[b]], self.contact[i as usize])
         });
-        let ways = vec![Quad::default(); poses.len()];
+        let displacements = vec![Quad::default(); poses.len()];
         let input = Input {
             poses: &poses,
-            ways: &ways,
+            displacements: &displacements,
             rolling: None,
             shapes: &self.rows,
             margins: Margins::within(SPECULATIVE),

@@ -11,7 +11,7 @@ use simpulse::engine::constraints::kernels::velocity::sweep::{self, sweep, sweep
 use simpulse::engine::constraints::kernels::velocity::warm_start::warm_start;
 use simpulse::engine::constraints::records::bounces::Bounces;
 use simpulse::engine::constraints::{
-    Batches, Features, Kernel, Layout, OppositeKind, Passes, PositionSweep, StepInput, Workspace,
+    Batches, Features, Kernel, Layout, PartnerKind, Passes, PositionSweep, StepInput, Workspace,
     kernels::prepare,
 };
 use simpulse::engine::contacts::{Contact, quad};
@@ -57,8 +57,8 @@ fn panics<T>(words: &str, run: impl FnOnce() -> T) {
     assert!(text.contains(words), "{text:?} does not say {words:?}");
 }
 
-fn layout(opposite: OppositeKind) -> Layout {
-    Layout::for_features(&Features::FULL, opposite)
+fn layout(partner: PartnerKind) -> Layout {
+    Layout::for_features(&Features::FULL, partner)
 }
 
 fn rows() -> Vec<BodyRow> {
@@ -69,9 +69,9 @@ fn rows() -> Vec<BodyRow> {
 fn batches(width: usize, contact: u32, a: u32, b: u32) -> Batches {
     let mut batches = Batches::default();
     batches.clear(width);
-    for opposite in OppositeKind::ALL {
+    for partner in PartnerKind::ALL {
         let pairs = (0..CONTACTS as u32).map(|i| if i == 9 { (contact, [a, b]) } else { (i, [i, i + 1]) });
-        batches.push_segment(opposite, &layout(opposite), pairs, ROWS as u32 - 1);
+        batches.push_segment(partner, &layout(partner), pairs, ROWS as u32 - 1);
     }
     batches.reserve_buffer();
     batches
@@ -249,10 +249,10 @@ fn wrong_layout<L: Lanes>() {
     for stride in [0, 1, usize::MAX / 2, usize::MAX] {
         let mut batches = Batches::default();
         batches.clear(L::WIDTH);
-        let layout = Layout { stride, ..layout(OppositeKind::Dynamic) };
+        let layout = Layout { stride, ..layout(PartnerKind::Dynamic) };
         let pushed = catch_unwind(AssertUnwindSafe(|| {
-            batches.push_segment(OppositeKind::Dynamic, &layout, [(0, [0, 1])].into_iter(), 2);
-            batches.push_segment(OppositeKind::Dynamic, &layout, [(0, [0, 1])].into_iter(), 2);
+            batches.push_segment(PartnerKind::Dynamic, &layout, [(0, [0, 1])].into_iter(), 2);
+            batches.push_segment(PartnerKind::Dynamic, &layout, [(0, [0, 1])].into_iter(), 2);
         }));
         if pushed.is_ok() {
             panics(words, || sweep::<L, Full, _>(&mut g.rows, &mut batches, RULE));
@@ -264,7 +264,7 @@ fn no_buffer<L: Lanes>() {
     for (.., pass) in passes::<L>() {
         let mut batches = Batches::default();
         batches.clear(L::WIDTH);
-        let kind = OppositeKind::Dynamic;
+        let kind = PartnerKind::Dynamic;
         batches.push_segment(kind, &layout(kind), (0..CONTACTS as u32).map(|i| (i, [i, i + 1])), 0);
         let mut given = Given::new(batches).with_bounces::<L>();
         panics("no room for records", || pass(&mut given));
@@ -346,9 +346,9 @@ fn the_bound_of_a_list_is_never_below_an_entry() {
 
 #[test]
 fn batches_without_a_width_take_no_segment() {
-    let layout = layout(OppositeKind::Dynamic);
+    let layout = layout(PartnerKind::Dynamic);
     let push = |mut b: Batches| {
-        b.push_segment(OppositeKind::Dynamic, &layout, [(0, [1_000_000_000, 2])].into_iter(), 0);
+        b.push_segment(PartnerKind::Dynamic, &layout, [(0, [1_000_000_000, 2])].into_iter(), 0);
     };
     panics("without lanes", || push(Batches::default()));
     panics("without lanes", || Batches::default().clear(0));
@@ -359,7 +359,7 @@ fn batches_without_a_width_take_no_segment() {
 fn a_sweep_over_no_rows_panics() {
     let mut batches = Batches::default();
     batches.clear(8);
-    let kind = OppositeKind::Dynamic;
+    let kind = PartnerKind::Dynamic;
     batches.push_segment(kind, &layout(kind), [(0, [1_000_000_000, 999_999_999])].into_iter(), 1_000_000_000);
     batches.reserve_buffer();
     panics("index 1000000000 where there are 0 rows", || {
@@ -406,7 +406,7 @@ fn collide(kind: PairKind, width: LaneWidth, pairs: u32, contacts: usize, spoil:
     spoil(&mut jobs);
     let input = Input {
         poses: &[PoseRow::default()],
-        ways: &[Quad::default()],
+        displacements: &[Quad::default()],
         rolling: None,
         shapes: &shapes,
         margins: Margins::within(0.02),

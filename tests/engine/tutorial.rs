@@ -4,7 +4,7 @@
 use simpulse::engine::bodies::{BodyDef, BodyKind, ShapeDef};
 use simpulse::engine::clock::Phase;
 use simpulse::engine::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
-use simpulse::engine::constraints::records::kept::KeptSize;
+use simpulse::engine::constraints::records::kept::StateSize;
 use simpulse::engine::constraints::records::point_vector::{dot, scaled, update};
 use simpulse::engine::constraints::{Passes, Schedule, System};
 use simpulse::engine::lanes::{LaneWidth, Lanes};
@@ -43,7 +43,7 @@ static ADAPTIVE: Variant = Variant {
         meaning: "residual of the contact law at which a step is solved",
         trials: &[],
     }],
-    kept: KeptSize { per_point: 1, ..KeptSize::NONE },
+    kept: StateSize { per_point: 1, ..StateSize::NONE },
     make: || Schedule::boxed(step),
     ..Variant::BASE
 };

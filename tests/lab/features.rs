@@ -1,6 +1,6 @@
 //! Law: features that a scene does not use cost nothing, and dropping them changes nothing.
 
-use simpulse::engine::constraints::{Features, Impacts, Layout, OppositeKind};
+use simpulse::engine::constraints::{Features, Impacts, Layout, PartnerKind};
 use simpulse::engine::solvers::VARIANTS;
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 
@@ -68,7 +68,7 @@ fn the_specialized_and_the_full_kernel_give_the_same_bits() {
 #[test]
 fn every_need_has_a_price_in_bytes() {
     let bytes = |features: Features| {
-        Layout::for_features(&features, OppositeKind::Dynamic).bytes(OppositeKind::Dynamic)
+        Layout::for_features(&features, PartnerKind::Dynamic).bytes(PartnerKind::Dynamic)
     };
     let mut features = Features::NONE;
     let mut last = bytes(features);

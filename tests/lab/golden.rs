@@ -68,7 +68,7 @@ fn all_hashes() -> String {
     for (variant, row) in VARIANTS.iter().zip(&cells) {
         writeln!(text, "solver {} {:016x}", variant.name, over(row, false)).unwrap();
     }
-    for (variant, row) in VARIANTS.iter().zip(&cells).filter(|(v, _)| v.holds_no_joints.is_none()) {
+    for (variant, row) in VARIANTS.iter().zip(&cells).filter(|(v, _)| v.joints_unsupported.is_none()) {
         writeln!(text, "joints {} {:016x}", variant.name, over(row, true)).unwrap();
     }
     for (s, name) in names.iter().enumerate() {

@@ -3,7 +3,7 @@
 
 use crate::common::{scene, settings, with_width};
 use simpulse::engine::clock::Phase;
-use simpulse::engine::constraints::{Layout, OppositeKind};
+use simpulse::engine::constraints::{Layout, PartnerKind};
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::{VARIANTS, find};
 use simpulse::lab::profile::{model, profile};
@@ -15,7 +15,7 @@ fn bytes_and_operations_are_those_of_the_layout() {
     for (width, lanes) in [(LaneWidth::W1, 1.0), (LaneWidth::W8, 8.0)] {
         let mut world = crate::common::run(&scene("stack:2"), with_width(solver, width), 5);
         let features = world.features();
-        let [on_ground, on_box] = [OppositeKind::Static, OppositeKind::Dynamic]
+        let [on_ground, on_box] = [PartnerKind::Static, PartnerKind::Dynamic]
             .map(|kind| Layout::for_features(&features, kind).bytes(kind) as f64);
         let solve = model::of(&mut world, Phase::Solve).unwrap();
         // Reads: a whole record and its indices, one row or two. Writes: four impulses, and one half row or

@@ -26,7 +26,7 @@ pub use kernels::pass::{AnyPass, Pass, PassInput};
 pub use kernels::position::PositionSweep;
 pub use kernels::velocity::rules::{self, NormalRule, Rule};
 pub use records::batches::Batches;
-pub use records::features::{Features, Kernel, KernelFeatures, Layout, OppositeKind};
+pub use records::features::{Features, Kernel, KernelFeatures, Layout, PartnerKind};
 pub use records::kept;
 pub use records::order::SweepOrder;
 pub use records::point_vector::PointVector;

@@ -3,7 +3,7 @@
 use super::axial::{Axial, Motor, Spring};
 use super::{Definition, Form, JointState, Measured, check_anchors, check_not_negative, excess};
 use crate::constraints::joints::rows::{Jacobian, JointPass, RowLaw, dot};
-use crate::constraints::joints::{JointType, Placing};
+use crate::constraints::joints::{JointSetup, JointType};
 use crate::error::Error;
 use crate::lanes::Lanes;
 
@@ -63,7 +63,7 @@ impl JointType for Distance {
         }
     }
 
-    fn place(&self, _form: Form, at: Placing<'_>, numbers: &mut [f32]) {
+    fn place(&self, _form: Form, at: JointSetup<'_>, numbers: &mut [f32]) {
         numbers[0] = self.length as f32;
         // Parts measure from the length, but limits are given as distances.
         let limits = self.limits.map(|limits| limits.map(|x| x - self.length));

@@ -4,7 +4,7 @@ use super::axial::Spring;
 use super::{Definition, Form, JointState, Measured, check_anchors, check_not_negative};
 use crate::bodies::def::finite;
 use crate::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
-use crate::constraints::joints::{JointType, Placing};
+use crate::constraints::joints::{JointSetup, JointType};
 use crate::error::Error;
 use crate::lanes::Lanes;
 
@@ -62,7 +62,7 @@ impl JointType for MotorJoint {
         6
     }
 
-    fn place(&self, _form: Form, mut at: Placing<'_>, numbers: &mut [f32]) {
+    fn place(&self, _form: Form, mut at: JointSetup<'_>, numbers: &mut [f32]) {
         numbers[0] = at.angle(self.angle);
         numbers[1..3].copy_from_slice(&self.spring.coefficients(at.h));
         (numbers[3], numbers[4]) = (self.max_force as f32 * at.h, self.max_torque as f32 * at.h);

@@ -4,7 +4,7 @@ use super::axial::Spring;
 use super::{Definition, Form, JointState, Measured, check_not_negative};
 use crate::bodies::def::finite_pair;
 use crate::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
-use crate::constraints::joints::{JointType, Placing};
+use crate::constraints::joints::{JointSetup, JointType};
 use crate::error::Error;
 use crate::lanes::Lanes;
 
@@ -52,7 +52,7 @@ impl JointType for Mouse {
         4
     }
 
-    fn place(&self, _form: Form, at: Placing<'_>, numbers: &mut [f32]) {
+    fn place(&self, _form: Form, at: JointSetup<'_>, numbers: &mut [f32]) {
         numbers[..2].copy_from_slice(&self.spring.coefficients(at.h));
         numbers[2] = self.max_force as f32 * at.h;
     }

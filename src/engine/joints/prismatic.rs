@@ -4,7 +4,7 @@ use super::axial::{Axial, Motor, Spring};
 use super::{Definition, Form, JointState, Measured, check_anchors, check_axis, excess, unit};
 use crate::bodies::def::finite;
 use crate::constraints::joints::rows::{Jacobian, JointPair, JointPass, RowLaw, add, dot};
-use crate::constraints::joints::{JointType, Placing};
+use crate::constraints::joints::{JointSetup, JointType};
 use crate::error::Error;
 use crate::lanes::Lanes;
 use glam::DVec2;
@@ -88,7 +88,7 @@ impl JointType for Prismatic {
         2 + Axial::kept(form)
     }
 
-    fn place(&self, _form: Form, mut at: Placing<'_>, numbers: &mut [f32]) {
+    fn place(&self, _form: Form, mut at: JointSetup<'_>, numbers: &mut [f32]) {
         numbers[..2].copy_from_slice(&at.direction(unit(self.axis)).to_array());
         numbers[2] = at.angle(self.reference_angle);
         self.axial().place(at.h, &mut numbers[FRAME..]);

@@ -4,7 +4,7 @@ use super::axial::{Axial, Motor, Spring};
 use super::{Definition, Form, JointState, Measured, check_anchors, excess};
 use crate::bodies::def::finite;
 use crate::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
-use crate::constraints::joints::{JointType, Placing};
+use crate::constraints::joints::{JointSetup, JointType};
 use crate::error::Error;
 use crate::lanes::Lanes;
 
@@ -56,7 +56,7 @@ impl JointType for Revolute {
         2 + Axial::kept(form)
     }
 
-    fn place(&self, form: Form, mut at: Placing<'_>, numbers: &mut [f32]) {
+    fn place(&self, form: Form, mut at: JointSetup<'_>, numbers: &mut [f32]) {
         if Axial::numbers(form) > 0 {
             numbers[0] = at.angle(self.reference_angle);
             self.axial().place(at.h, &mut numbers[1..]);

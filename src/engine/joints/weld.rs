@@ -4,7 +4,7 @@ use super::axial::Spring;
 use super::{Definition, Form, JointState, Measured, check_anchors};
 use crate::bodies::def::finite;
 use crate::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
-use crate::constraints::joints::{JointType, Placing};
+use crate::constraints::joints::{JointSetup, JointType};
 use crate::error::Error;
 use crate::lanes::Lanes;
 
@@ -49,7 +49,7 @@ impl JointType for Weld {
         3 + 2 * usize::from(form.spring) + usize::from(form.motor)
     }
 
-    fn place(&self, _form: Form, mut at: Placing<'_>, numbers: &mut [f32]) {
+    fn place(&self, _form: Form, mut at: JointSetup<'_>, numbers: &mut [f32]) {
         numbers[0] = at.angle(self.reference_angle);
         let springs =
             [self.linear, self.angular].into_iter().flatten().map(|spring| spring.coefficients(at.h));

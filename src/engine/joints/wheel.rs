@@ -4,7 +4,7 @@ use super::axial::{Axial, Motor, Spring};
 use super::prismatic::along_and_across;
 use super::{Definition, Form, JointState, Measured, check_anchors, check_axis, excess, unit};
 use crate::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
-use crate::constraints::joints::{JointType, Placing};
+use crate::constraints::joints::{JointSetup, JointType};
 use crate::error::Error;
 use crate::lanes::Lanes;
 use glam::DVec2;
@@ -76,7 +76,7 @@ impl JointType for Wheel {
         1 + Axial::kept(form)
     }
 
-    fn place(&self, form: Form, at: Placing<'_>, numbers: &mut [f32]) {
+    fn place(&self, form: Form, at: JointSetup<'_>, numbers: &mut [f32]) {
         numbers[..2].copy_from_slice(&at.direction(unit(self.axis)).to_array());
         let (suspension, drive) = numbers[FRAME..].split_at_mut(Axial::numbers(split(form)[0]));
         self.suspension().place(at.h, suspension);

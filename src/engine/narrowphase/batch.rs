@@ -134,7 +134,7 @@ pub struct Input<'a> {
     pub poses: &'a [PoseRow],
     /// Motion of bodies without contacts over slightly more than the coming step: `[x, y, θ, 0]` (m, rad), by
     /// body.
-    pub ways: &'a [Quad],
+    pub displacements: &'a [Quad],
     /// If set, radii of curvature are computed, and contacts may roll.
     pub rolling: Option<Rolling>,
     /// Shapes by number.
@@ -168,7 +168,7 @@ pub fn update(
         list
     };
     let made = contacts.len();
-    assert!(input.ways.len() == input.poses.len(), "ways of as many bodies as poses");
+    assert!(input.displacements.len() == input.poses.len(), "displacements of as many bodies as poses");
     let indices = JobIndices {
         bodies: jobs.bodies.each_ref().map(|list| below(list, input.poses.len(), "bodies")),
         shapes: jobs.shapes.each_ref().map(|list| below(list, input.shapes.rows.len(), "shapes")),
@@ -225,19 +225,22 @@ fn run<L: Lanes, const KIND: usize>(
 ) -> usize {
     // Spilled vectors then do not cross cache lines; see `align_frame`.
     align_frame();
-    let Input { poses, ways, rolling, shapes: Shapes { rows, hulls }, margins } = input;
+    let Input { poses, displacements, rolling, shapes: Shapes { rows, hulls }, margins } = input;
     match const { PairKind::ALL[KIND] } {
         PairKind::Rectangles => run_kernel(jobs, indices, contacts, made, false, change, |bodies, shapes| {
             let poses = Poses::<L>::gather(poses, bodies);
             let pair = ShapePair::gather(poses, rows, shapes);
-            (rectangles::collide(&pair, margins).without_grazes().on_held(poses.held[0]), [L::zero(); 2])
+            (
+                rectangles::collide(&pair, margins).without_grazes().against_immovable(poses.held[0]),
+                [L::zero(); 2],
+            )
         }),
         PairKind::Circles => {
             run_kernel(jobs, indices, contacts, made, rolling.is_some(), change, |bodies, shapes| {
                 let poses = Poses::<L>::gather(poses, bodies);
                 let pair = ShapePair::gather(poses, rows, shapes);
-                let ways = bodies.map(|body| L::gather_quads::<1, 0>(ways, body));
-                circles::in_step(&pair, ways, rolling, margins)
+                let displacements = bodies.map(|body| L::gather_quads::<1, 0>(displacements, body));
+                circles::in_step(&pair, displacements, rolling, margins)
             })
         }
         PairKind::Hulls => {
@@ -245,7 +248,10 @@ fn run<L: Lanes, const KIND: usize>(
             run_kernel(jobs, indices, contacts, made, false, change, |bodies, shapes| {
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(&poses, hulls, shapes);
-                (pair.collide(&poses, margins).without_grazes().on_held(poses.held[0]), [L::zero(); 2])
+                (
+                    pair.collide(&poses, margins).without_grazes().against_immovable(poses.held[0]),
+                    [L::zero(); 2],
+                )
             })
         }
         PairKind::HullCircle => {
@@ -253,9 +259,9 @@ fn run<L: Lanes, const KIND: usize>(
             run_kernel(jobs, indices, contacts, made, rolling.is_some(), change, |bodies, shapes| {
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(hulls, rows, shapes);
-                let ways = bodies.map(|body| L::gather_quads::<1, 0>(ways, body));
-                let (touch, gap, radii) = pair.in_step(&poses, ways, rolling, margins);
-                (touch.on_held(poses.held[0]).with_gap(gap), radii)
+                let displacements = bodies.map(|body| L::gather_quads::<1, 0>(displacements, body));
+                let (touch, gap, radii) = pair.in_step(&poses, displacements, rolling, margins);
+                (touch.against_immovable(poses.held[0]).with_gap(gap), radii)
             })
         }
         PairKind::CircleHull => {
@@ -263,9 +269,10 @@ fn run<L: Lanes, const KIND: usize>(
             run_kernel(jobs, indices, contacts, made, rolling.is_some(), change, |bodies, [a, b]| {
                 let poses = Poses::gather(poses, bodies).swapped();
                 pair.gather(hulls, rows, [b, a]);
-                let ways = [bodies[1], bodies[0]].map(|body| L::gather_quads::<1, 0>(ways, body));
-                let (touch, gap, [hull, circle]) = pair.in_step(&poses, ways, rolling, margins);
-                (touch.swapped().on_held(poses.held[1]).with_gap(gap), [circle, hull])
+                let displacements =
+                    [bodies[1], bodies[0]].map(|body| L::gather_quads::<1, 0>(displacements, body));
+                let (touch, gap, [hull, circle]) = pair.in_step(&poses, displacements, rolling, margins);
+                (touch.swapped().against_immovable(poses.held[1]).with_gap(gap), [circle, hull])
             })
         }
     }

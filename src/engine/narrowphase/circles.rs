@@ -3,14 +3,14 @@
 //! # Circles that pass
 //!
 //! A step uses the gap along the normal n at its start. Let Δ be the relative motion over one step plus the
-//! substep that a sweep at its end looks ahead. Two circles that pass each other on the way Δ end up farther
+//! substep that a sweep at its end looks ahead. Two circles that pass each other during the displacement Δ end up farther
 //! apart than along n. With the distance ℓ of their centers and Δ = (Δ_n, Δ_t), the distance at the end is
 //!
 //! ```text
 //! ℓ' = √((ℓ + Δ_n)² + Δ_t²) = ℓ + Δ_n + Δ_t²/(ℓ' + ℓ + Δ_n)
 //! ```
 //!
-//! The reported gap is increased by the last term if the circles come no closer on their way than an overlap
+//! The reported gap is increased by the last term if the circles come no closer during their displacement than an overlap
 //! of one slop. It is then correct at the end of the step, and circles that do not touch are not pushed
 //! apart. Circles that overlap by less than the slop, and have passed each other by the end of the step, are
 //! left alone until the next step detects them.
@@ -23,21 +23,21 @@ use crate::lanes::Lanes;
 /// gap that they then have at the end of the step.
 pub(super) const PASSING: [f32; 2] = [0.2, 1e-3];
 
-/// The gap (m) of two circles with centers `distance` apart (m) and a relative motion of `way` in the coming
+/// The gap (m) of two circles with centers `distance` apart (m) and a relative motion of `displacement` in the coming
 /// step (m); see the [module](self).
 #[inline(always)]
-pub fn passing<L: Lanes>(touch: &Touch<L>, distance: L, way: [L; 2], slop: f32) -> L {
+pub fn passing<L: Lanes>(touch: &Touch<L>, distance: L, displacement: [L; 2], slop: f32) -> L {
     let (zero, one, slop) = (L::zero(), L::splat(1.0), L::splat(slop));
     let gap = touch.separation[0];
     let [nx, ny] = touch.normal;
-    let along = nx.mul_add(way[0], ny * way[1]);
-    let across = nx.mul_add(way[1], -(ny * way[0]));
+    let along = nx.mul_add(displacement[0], ny * displacement[1]);
+    let across = nx.mul_add(displacement[1], -(ny * displacement[0]));
     let length = |x: L, y: L| x.mul_add(x, y * y).sqrt();
     let straight = distance + along;
     let end = length(straight, across);
     let sum = end + straight;
     let bend = sum.select_positive(across * across / sum.select_positive(sum, one), zero);
-    // Fraction of the way at which they come closest.
+    // Fraction of the displacement at which they come closest.
     let squared = along.mul_add(along, across * across);
     let part = -(distance * along) / squared.select_positive(squared, one);
     let until = part.max(zero).min(one);
@@ -49,7 +49,7 @@ pub fn passing<L: Lanes>(touch: &Touch<L>, distance: L, way: [L; 2], slop: f32) 
     gap.min(closest + slop).select_positive(raised, gap)
 }
 
-/// Time, as a fraction of the way, at which two centers that are `distance` apart (m) are `reach` apart:
+/// Time, as a fraction of the displacement, at which two centers that are `distance` apart (m) are `reach` apart:
 /// |d + u t| = R. The second value is positive if they come that close. `toward` is the product d·u,
 /// `squared` is u².
 #[inline(always)]
@@ -79,22 +79,22 @@ impl Rolling {
     }
 }
 
-/// Contacts of the circles of `pair` in the coming step, in which bodies move by `ways` (`[x, y, θ, 0]`, m
+/// Contacts of the circles of `pair` in the coming step, in which bodies move by `displacements` (`[x, y, θ, 0]`, m
 /// and rad). Also returns their radii of curvature if `rolling` is given, otherwise zeros; see [`Rolling`].
 #[inline(always)]
 pub fn in_step<L: Lanes>(
     pair: &ShapePair<L>,
-    ways: [[L; 4]; 2],
+    displacements: [[L; 4]; 2],
     rolling: Option<Rolling>,
     margins: Margins,
 ) -> (Touch<L>, [L; 2]) {
     let (touch, distance) = with_distance(pair, margins.speculative);
-    let way = pair.way(ways);
+    let displacement = pair.displacement(displacements);
     let held = pair.poses.held[0];
-    let gap = passing(&touch, distance, way, margins.slop);
-    let touch = touch.on_held(held);
+    let gap = passing(&touch, distance, displacement, margins.slop);
+    let touch = touch.against_immovable(held);
     let Some(rolling) = rolling else { return (touch.with_gap(gap), [L::zero(); 2]) };
-    let gap = rolling.rolls(dot(touch.normal, way)).select_positive(touch.separation[0], gap);
+    let gap = rolling.rolls(dot(touch.normal, displacement)).select_positive(touch.separation[0], gap);
     // Coincident centers define no direction to turn.
     let radii = pair.size.map(|size| distance.select_positive(size[2], L::zero()));
     (touch.with_gap(gap), radii)

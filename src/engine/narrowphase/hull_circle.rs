@@ -8,7 +8,7 @@
 use super::Margins;
 use super::circles::{PASSING, Rolling, arrival};
 use super::hull::{Hull, HullRow};
-use super::lanes::{Poses, ShapeRow, Touch, abs, dot, perp, rotate, unrotate, way_between};
+use super::lanes::{Poses, ShapeRow, Touch, abs, displacement_between, dot, perp, rotate, unrotate};
 use crate::lanes::{LaneIndex, Lanes, MOST_LANES};
 
 /// Hulls (as a) and circles (as b).
@@ -37,12 +37,15 @@ impl<L: Lanes> HullCircle<L> {
 
     /// Displacement of the circle's center in the hull's frame when bodies move by `[x, y, θ, 0]` (m, rad).
     #[inline(always)]
-    fn way(&self, poses: &Poses<L>, ways: [[L; 4]; 2]) -> [L; 2] {
+    fn displacement(&self, poses: &Poses<L>, displacements: [[L; 4]; 2]) -> [L; 2] {
         let center = rotate(poses.rotation[1], self.circle.0);
-        way_between(ways, [[poses.centers[0] + center[0], poses.centers[1] + center[1]], center])
+        displacement_between(
+            displacements,
+            [[poses.centers[0] + center[0], poses.centers[1] + center[1]], center],
+        )
     }
 
-    /// Contacts in the coming step, in which bodies move by `ways` (`[x, y, θ, 0]`, m and rad); those farther
+    /// Contacts in the coming step, in which bodies move by `displacements` (`[x, y, θ, 0]`, m and rad); those farther
     /// apart than `margins.speculative` (m) are omitted. Also returns their gaps, which at a corner are those
     /// of two passing circles ([`super::circles`]), and the radii of curvature of hull and circle if
     /// `rolling` is given, otherwise zeros.
@@ -50,11 +53,11 @@ impl<L: Lanes> HullCircle<L> {
     pub fn in_step(
         &self,
         poses: &Poses<L>,
-        ways: [[L; 4]; 2],
+        displacements: [[L; 4]; 2],
         rolling: Option<Rolling>,
         margins: Margins,
     ) -> (Touch<L>, L, [L; 2]) {
-        let way = self.way(poses, ways);
+        let displacement = self.displacement(poses, displacements);
         let (zero, one, half) = (L::zero(), L::splat(1.0), L::splat(0.5));
         let rotation_a = poses.rotation[0];
         let (center, radius) = (rotate(poses.rotation[1], self.circle.0), self.circle.1);
@@ -84,10 +87,10 @@ impl<L: Lanes> HullCircle<L> {
             corner.select_positive(height.mul_add(n[1], past * t[1]) * inverse, n[1]),
         ];
         let separation = distance - (self.hull.head[0] + radius);
-        let way = unrotate(rotation_a, way);
+        let displacement = unrotate(rotation_a, displacement);
         let gap = {
             let slop = L::splat(margins.slop);
-            let (up, aside) = (dot(n, way), dot(t, way));
+            let (up, aside) = (dot(n, displacement), dot(t, displacement));
             let toward = height.mul_add(up, past * aside);
             let length_of = |x: L, y: L| x.mul_add(x, y * y).sqrt();
             // Position at the end of the step: above the face, or past one of its ends.
@@ -110,14 +113,18 @@ impl<L: Lanes> HullCircle<L> {
         let mut gap = gap;
         let mut radii = [zero; 2];
         if let Some(rolling) = rolling {
-            let rolls = rolling.rolls(dot(normal, way));
+            let rolls = rolling.rolls(dot(normal, displacement));
             gap = rolls.select_positive(separation, gap);
             // When the circle is at touching distance, it must still be past the same end, and above the
             // face.
             let reach = distance - separation;
-            let [part, comes] = arrival(dot(normal, way) * distance, dot(way, way), [distance, reach]);
+            let [part, comes] = arrival(
+                dot(normal, displacement) * distance,
+                dot(displacement, displacement),
+                [distance, reach],
+            );
             let part = comes.select_positive(part, zero);
-            let (up, aside) = (dot(n, way), dot(t, way));
+            let (up, aside) = (dot(n, displacement), dot(t, displacement));
             let outside = past * part.mul_add(aside, past);
             let stays = rolls.select_positive(one, part.mul_add(up, height).min(outside));
             let curved = corner.select_positive(self.hull.head[0], L::splat(f32::INFINITY));

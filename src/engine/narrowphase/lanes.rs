@@ -162,18 +162,22 @@ impl<L: Lanes> ShapePair<L> {
 impl<L: Lanes> ShapePair<L> {
     /// Relative displacement of the shapes' centers when bodies move by `[x, y, θ, 0]` (m, rad).
     #[inline(always)]
-    pub fn way(&self, ways: [[L; 4]; 2]) -> [L; 2] {
+    pub fn displacement(&self, displacements: [[L; 4]; 2]) -> [L; 2] {
         let center = |k: usize| rotate(self.poses.rotation[k], [self.place[k][0], self.place[k][1]]);
-        way_between(ways, [center(0), center(1)])
+        displacement_between(displacements, [center(0), center(1)])
     }
 }
 
 /// Displacement of the point at `r[1]` from b's center relative to the point at `r[0]` from a's, in world
 /// axes (m).
 #[inline(always)]
-pub fn way_between<L: Lanes>(ways: [[L; 4]; 2], r: [[L; 2]; 2]) -> [L; 2] {
-    let of =
-        |k: usize| [ways[k][2].neg_mul_add(r[k][1], ways[k][0]), ways[k][2].mul_add(r[k][0], ways[k][1])];
+pub fn displacement_between<L: Lanes>(displacements: [[L; 4]; 2], r: [[L; 2]; 2]) -> [L; 2] {
+    let of = |k: usize| {
+        [
+            displacements[k][2].neg_mul_add(r[k][1], displacements[k][0]),
+            displacements[k][2].mul_add(r[k][0], displacements[k][1]),
+        ]
+    };
     let ([ax, ay], [bx, by]) = (of(0), of(1));
     [bx - ax, by - ay]
 }
@@ -219,7 +223,7 @@ impl<L: Lanes> Touch<L> {
     /// held one has friction at its own surface: a disc that overlaps the ground by s and slides at v rolls
     /// away at v/(1 + I/(m r a)) with the arm a. That is 2/3 v for a = r, and 2/9 s/r v less for a = r − s/2.
     #[inline(always)]
-    pub fn on_held(self, held: L) -> Self {
+    pub fn against_immovable(self, held: L) -> Self {
         let [nx, ny] = self.normal;
         let half = L::splat(0.5) * held;
         let moved = |anchors: [[L; 2]; 2]| {

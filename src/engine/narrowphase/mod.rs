@@ -54,18 +54,18 @@ pub fn collide(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, speculative_d
         .map_or_else(Manifold::default, |pair| pair.collide([pose_a, pose_b], speculative_distance))
 }
 
-/// As [`collide`], for the coming step. Unhindered bodies would move by `ways` (`[x, y, θ, 0]`, m and rad).
-/// If `a_is_held`, the body of `a` is not moved by impulses, and points lie on the surface of `b`. Grazes,
+/// As [`collide`], for the coming step. Unhindered bodies would move by `displacements` (`[x, y, θ, 0]`, m and rad).
+/// If `a_is_immovable`, the body of `a` is not moved by impulses, and points lie on the surface of `b`. Grazes,
 /// which bodies slide over, are omitted.
 pub fn collide_in_step(
     [a, b]: [&Shape; 2],
     poses: [&Pose; 2],
-    ways: [[f32; 4]; 2],
-    a_is_held: bool,
+    displacements: [[f32; 4]; 2],
+    a_is_immovable: bool,
     margins: Margins,
 ) -> Manifold {
     Collider::new(a, b).map_or_else(Manifold::default, |pair| {
-        pair.touch(poses, ways, a_is_held, margins).without_grazes().manifold()
+        pair.touch(poses, displacements, a_is_immovable, margins).without_grazes().manifold()
     })
 }
 
@@ -122,30 +122,33 @@ impl Collider {
     fn touch(
         &self,
         [pose_a, pose_b]: [&Pose; 2],
-        ways: [[f32; 4]; 2],
-        a_is_held: bool,
+        displacements: [[f32; 4]; 2],
+        a_is_immovable: bool,
         margins: Margins,
     ) -> Touch<f32> {
         let [row_a, row_b] = self.rows;
         let poses = Poses::<f32>::new(pose_a, pose_b);
-        let held = f32::from(u8::from(a_is_held));
+        let held = f32::from(u8::from(a_is_immovable));
         let pair = ShapePair { poses, place: [row_a.place, row_b.place], size: [row_a.size, row_b.size] };
         match self.kind {
-            PairKind::Rectangles => rectangles::collide(&pair, margins).on_held(held),
+            PairKind::Rectangles => rectangles::collide(&pair, margins).against_immovable(held),
             PairKind::Circles => {
                 let pair = ShapePair { poses: Poses { held: [held, 0.0], ..poses }, ..pair };
-                circles::in_step(&pair, ways, None, margins).0
+                circles::in_step(&pair, displacements, None, margins).0
             }
-            PairKind::Hulls => Hulls::new(&poses, &self.hulls).collide(&poses, margins).on_held(held),
+            PairKind::Hulls => {
+                Hulls::new(&poses, &self.hulls).collide(&poses, margins).against_immovable(held)
+            }
             PairKind::HullCircle => {
                 let (touch, gap, _) =
-                    HullCircle::new(self.hulls[0], row_b).in_step(&poses, ways, None, margins);
-                touch.on_held(held).with_gap(gap)
+                    HullCircle::new(self.hulls[0], row_b).in_step(&poses, displacements, None, margins);
+                touch.against_immovable(held).with_gap(gap)
             }
             PairKind::CircleHull => {
                 let (pair, poses) = (HullCircle::new(self.hulls[1], row_a), poses.swapped());
-                let (touch, gap, _) = pair.in_step(&poses, [ways[1], ways[0]], None, margins);
-                touch.swapped().on_held(held).with_gap(gap)
+                let (touch, gap, _) =
+                    pair.in_step(&poses, [displacements[1], displacements[0]], None, margins);
+                touch.swapped().against_immovable(held).with_gap(gap)
             }
         }
     }

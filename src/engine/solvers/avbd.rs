@@ -56,10 +56,10 @@ mod lanes;
 
 use super::{Law, Uses, Variant};
 use crate::clock::Phase;
-use crate::constraints::kernels::types::{BodyStates, Joined};
+use crate::constraints::kernels::types::{BodyStates, ConstraintSet};
 use crate::constraints::numerics::cone;
 use crate::constraints::records::graph::Graph;
-use crate::constraints::records::kept::KeptSize;
+use crate::constraints::records::kept::StateSize;
 use crate::constraints::step::StepParts;
 use crate::constraints::{Features, ImpactLaw, Passes, Solver, Workspace};
 use crate::params::{Budget, Parameter};
@@ -99,7 +99,7 @@ pub static SOLVER: Variant = Variant {
             trials: &[],
         },
     ],
-    kept: KeptSize { per_point: PER_POINT, per_body: PER_BODY, ..KeptSize::NONE },
+    kept: StateSize { per_point: PER_POINT, per_body: PER_BODY, ..StateSize::NONE },
     breaks: &[
         (Law::Momentum, "bodies are moved one at a time and meet only in the limit"),
         (Law::Converges, "the law that it solves is one of positions"),
@@ -153,7 +153,7 @@ impl Avbd {
         passes.build_whole_graph(&mut self.graph);
         let StepParts { work: Workspace { rows, poses, types, lanes, serial, .. }, contacts, width, .. } =
             passes.parts();
-        let colored = |types: &[Joined]| types.iter().any(|joined| joined.is_colored());
+        let colored = |types: &[ConstraintSet]| types.iter().any(|joined| joined.is_colored());
         let sequence = (lanes.segments().is_empty() && !colored(types)).then(|| serial.contact());
         self.descent.joints.assign(types, BodyStates { rows, poses });
         self.descent.assign(rows, contacts, &self.graph, width, sequence);

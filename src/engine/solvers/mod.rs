@@ -26,7 +26,7 @@
 //! ```
 
 use crate::clock::Clock;
-use crate::constraints::records::kept::KeptSize;
+use crate::constraints::records::kept::StateSize;
 use crate::constraints::{ImpactLaw, Passes, Schedule, Solver, StepInput, WorkCount, Workspace};
 use crate::contacts::Contact;
 use crate::error::Error;
@@ -197,9 +197,9 @@ pub struct Variant {
     /// Default of [continuous collision](crate::continuous).
     pub continuous: bool,
     /// Numbers kept from step to step, in addition to impulses.
-    pub kept: KeptSize,
+    pub kept: StateSize,
     /// Why it does not support joints, if it does not.
-    pub holds_no_joints: Option<&'static str>,
+    pub joints_unsupported: Option<&'static str>,
     /// Properties that it does not have, with the reason.
     pub breaks: &'static [(Law, &'static str)],
     /// Creates the solver of a world: its schedule and its state.
@@ -228,8 +228,8 @@ impl Variant {
         impacts: ImpactLaw::Bias,
         frozen: None,
         continuous: false,
-        kept: KeptSize::NONE,
-        holds_no_joints: None,
+        kept: StateSize::NONE,
+        joints_unsupported: None,
         breaks: &[],
         make: || Schedule::boxed(|_| {}),
     };

@@ -48,7 +48,7 @@ use crate::constraints::kernels::velocity::sweep::Sweep;
 use crate::constraints::numerics::cone;
 use crate::constraints::records::batches::{Batches, Segment};
 use crate::constraints::records::features::{
-    KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
+    KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
 use crate::constraints::{Passes, Schedule};
 use crate::lanes::{BodyRow, Lanes};
@@ -101,7 +101,7 @@ fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule>(rows: &mut [BodyRow], batch
 }
 
 #[inline(always)]
-fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
+fn segment<L: Lanes, N: KernelFeatures, O: Partner, R: NormalRule>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,
@@ -117,7 +117,7 @@ struct PointByPoint<R>(R);
 /// c (N·s) and s (kg) of the normal rows.
 type Lines<L> = [[L; 2]; 2];
 
-impl<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule> Stages<L, N, O> for PointByPoint<R> {
+impl<L: Lanes, N: KernelFeatures, O: Partner, R: NormalRule> Stages<L, N, O> for PointByPoint<R> {
     type Partial = Lines<L>;
 
     #[inline(always)]

@@ -36,7 +36,7 @@ use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Soft;
 use crate::constraints::kernels::velocity::sticky::{Patch, Sticky};
 use crate::constraints::kernels::velocity::sweep::Sweep;
-use crate::constraints::records::kept::KeptSize;
+use crate::constraints::records::kept::StateSize;
 use crate::constraints::step::Drifts;
 use crate::constraints::{Passes, Solver};
 use crate::params::{Budget, Parameter};
@@ -60,7 +60,7 @@ pub static SOLVER: Variant = Variant {
         },
         Parameter::push_speed(1e3),
     ],
-    kept: KeptSize { per_point: 1, ..KeptSize::NONE },
+    kept: StateSize { per_point: 1, ..StateSize::NONE },
     breaks: &[
         (Law::Cone, "a point may take its share of the whole contact's load"),
         (Law::Converges, "friction holds positions, which is another law"),

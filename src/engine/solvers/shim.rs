@@ -35,7 +35,7 @@ use crate::clock::Phase;
 use crate::constraints::impacts::spread::VISITS;
 use crate::constraints::joints::chains::{ChainStage, Chains};
 use crate::constraints::kernels::velocity::rules::{Bearing, Between, Relaxed, Rigid, Soft};
-use crate::constraints::records::kept::KeptSize;
+use crate::constraints::records::kept::StateSize;
 use crate::constraints::step::{Collision, CollisionScene};
 use crate::constraints::{ImpactLaw, ImpactWaves, Passes, Solver};
 use crate::lanes::BodyRow;
@@ -79,7 +79,7 @@ pub static SOLVER: Variant = Variant {
     ],
     mechanisms: &MECHANISMS,
     breaks: &[(Law::Converges, "preload is part of its law, and comes from the steps before")],
-    kept: KeptSize { per_contact: PER_CONTACT, ..KeptSize::NONE },
+    kept: StateSize { per_contact: PER_CONTACT, ..StateSize::NONE },
     impacts: ImpactLaw::Solver { per_contact: 0, per_point: 0 },
     continuous: true,
     make: Variant::made_by(|| Box::new(Shim::default())),

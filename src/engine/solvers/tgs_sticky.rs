@@ -20,7 +20,7 @@
 use super::{Law, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::sticky::Sticky;
-use crate::constraints::records::kept::KeptSize;
+use crate::constraints::records::kept::StateSize;
 use crate::constraints::step::Drifts;
 use crate::constraints::{ImpactLaw, Passes, Solver};
 use crate::params::{Budget, LINEAR_SLOP, Parameter};
@@ -52,7 +52,7 @@ pub static SOLVER: Variant = Variant {
         },
         Parameter::push_speed(4.0),
     ],
-    kept: KeptSize { per_point: 1, ..KeptSize::NONE },
+    kept: StateSize { per_point: 1, ..StateSize::NONE },
     breaks: &[
         (Law::Cone, "a point may take its share of the whole manifold's load"),
         (Law::Converges, "friction holds positions, which is another law"),

@@ -30,7 +30,7 @@ pub(super) struct Narrow {
     pub jobs_are_current: bool,
     pub frozen: FrozenContacts,
     poses: Vec<PoseRow>,
-    ways: Vec<Quad>,
+    displacements: Vec<Quad>,
     jobs: [Jobs; PairKind::ALL.len()],
     /// New contacts, in the order in which they were found.
     fresh: Vec<Contact>,
@@ -39,7 +39,7 @@ pub(super) struct Narrow {
     count: usize,
 }
 
-/// Length of the predicted motion `ways` in steps (1): the relax sweep at the end of a step looks one substep
+/// Length of the predicted `displacements` in steps (1): the relax sweep at the end of a step looks one substep
 /// ahead.
 const AHEAD: f32 = 1.25;
 
@@ -79,9 +79,9 @@ impl World {
                 0.0,
             ],
         }));
-        narrow.ways.clear();
+        narrow.displacements.clear();
         let dt = AHEAD * self.settings.dt;
-        narrow.ways.extend((0..bodies.len()).map(|i| {
+        narrow.displacements.extend((0..bodies.len()).map(|i| {
             Quad([dt * bodies.velocity_x[i], dt * bodies.velocity_y[i], dt * bodies.angular_velocity[i], 0.0])
         }));
         let mut asked = Collision::default();
@@ -96,7 +96,7 @@ impl World {
         frozen.update(all, &mut self.contacts, self.settings.freezing(), reaches);
         let mut points = narrow.list_jobs(&self.contacts);
 
-        let Narrow { candidates, jobs, fresh, is_changed, poses, ways, shapes, .. } = narrow;
+        let Narrow { candidates, jobs, fresh, is_changed, poses, displacements, shapes, .. } = narrow;
         fresh.clear();
         let mut change = |name: u32, contact: &Contact| {
             let candidate = &mut candidates[name as usize];
@@ -109,9 +109,10 @@ impl World {
             };
             *is_changed = true;
         };
-        // `ways` covers more than a step.
+        // `displacements` covers more than a step.
         let rolling = asked.rolling.map(|Rolling { limit }| Rolling { limit: AHEAD * limit });
-        let input = Input { poses, ways, rolling, shapes, margins: Margins::of(self.settings.length_unit) };
+        let input =
+            Input { poses, displacements, rolling, shapes, margins: Margins::of(self.settings.length_unit) };
         for (kind, jobs) in PairKind::ALL.into_iter().zip(jobs) {
             points +=
                 batch::update(kind, self.settings.widths()[1], jobs, input, &mut self.contacts, &mut change);

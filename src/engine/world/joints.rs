@@ -3,7 +3,7 @@
 use super::World;
 use crate::bodies::{Bodies, BodyHandle};
 use crate::constraints::joints::Joints;
-use crate::constraints::kernels::types::{BodyStates, ConstraintType, Joined, RecordedImpulses};
+use crate::constraints::kernels::types::{BodyStates, ConstraintSet, ConstraintType, RecordedImpulses};
 use crate::constraints::records::rows::{ROWS, RowBlock};
 use crate::error::Error;
 use crate::joints::{Definition, Form, Joint, JointHandle, JointKind, JointState, measured, of_kind};
@@ -250,7 +250,8 @@ impl World {
             let message = format!("neither body {} nor body {} moves by forces", ends[0], ends[1]);
             return Err(Error::invalid("b", message));
         }
-        if let (Some(reason), false) = (self.settings.solver.holds_no_joints, joint.kind == JointKind::Filter)
+        if let (Some(reason), false) =
+            (self.settings.solver.joints_unsupported, joint.kind == JointKind::Filter)
         {
             let message = format!("{} holds no joints: {reason}", self.settings.solver.name);
             return Err(Error::invalid("solver", message));
@@ -259,14 +260,14 @@ impl World {
     }
 
     /// Constraints of the caller's own types.
-    pub(super) fn own_types(&self) -> &[Joined] {
+    pub(super) fn own_types(&self) -> &[ConstraintSet] {
         &self.work.types[..self.work.types.len() - self.joints.groups]
     }
 
     /// Adds constraints of one of the caller's own types, before the groups of joints.
     pub(super) fn add_type(&mut self, kind: Box<dyn ConstraintType>) {
         let place = self.own_types().len();
-        self.work.types.insert(place, Joined::new(kind));
+        self.work.types.insert(place, ConstraintSet::new(kind));
         for [group, _] in self.joints.places.iter_mut().flatten() {
             *group += 1;
         }
@@ -293,7 +294,7 @@ impl World {
             return;
         }
         let first = self.work.types.len() - self.joints.groups;
-        let old: Vec<Joined> = self.work.types.drain(first..).collect();
+        let old: Vec<ConstraintSet> = self.work.types.drain(first..).collect();
         self.joints.apart.clear();
         let of_substep = self.impulses_of.unwrap_or_default();
         let mut keys: Vec<(&'static str, Form, bool)> = Vec::new();
@@ -312,7 +313,7 @@ impl World {
             of_kind!(&joint.kind, definition => {
                 let group = keys.iter().position(|k| *k == key).unwrap_or_else(|| {
                     keys.push(key);
-                    self.work.types.push(Joined::new(empty(definition, key.2, of_substep)));
+                    self.work.types.push(ConstraintSet::new(empty(definition, key.2, of_substep)));
                     keys.len() - 1
                 });
                 let kind: &mut dyn Any = self.work.types[first + group].kind.as_mut();

@@ -3,7 +3,7 @@
 use super::{Order, World};
 use crate::bodies::BodyKind;
 use crate::constraints::step::assign::Sides;
-use crate::constraints::{Features, OppositeKind};
+use crate::constraints::{Features, PartnerKind};
 
 impl World {
     /// Assigns every contact to a lane. The last step's lanes are reused while the set of contacts is the
@@ -16,14 +16,14 @@ impl World {
         }
         (self.narrow.is_changed, self.lanes_are_for) = (false, choice);
         let kinds = &self.bodies.kind;
-        let opposite = |body: u32| match kinds[body as usize] {
-            BodyKind::Dynamic => OppositeKind::Dynamic,
-            BodyKind::Kinematic => OppositeKind::Kinematic,
-            BodyKind::Static => OppositeKind::Static,
+        let partner = |body: u32| match kinds[body as usize] {
+            BodyKind::Dynamic => PartnerKind::Dynamic,
+            BodyKind::Kinematic => PartnerKind::Kinematic,
+            BodyKind::Static => PartnerKind::Static,
         };
         let (work, contacts) = (&mut self.work, &self.contacts);
         let levels = self.solver.levels(&self.bodies, contacts);
-        let sides = Sides { bodies: kinds.len(), opposite, levels };
+        let sides = Sides { bodies: kinds.len(), partner, levels };
         match self.settings.order {
             Order::Natural => {
                 self.assignment.serial(work, features, contacts, 0..contacts.len() as u32, &sides);

@@ -10,7 +10,7 @@ use super::joints::SavedJoints;
 use super::traits::Traits;
 use super::{Settings, World};
 use crate::bodies::{BodyDef, BodyKind};
-use crate::constraints::records::kept::Kept;
+use crate::constraints::records::kept::SolverState;
 use crate::contacts::Contact;
 use crate::lanes::LaneWidth;
 use crate::narrowphase::frozen::FrozenContacts;
@@ -69,7 +69,7 @@ struct SavedWorld {
     surfaces: Vec<[f32; 2]>,
     contacts: Vec<Contact>,
     impulses_of: Option<f32>,
-    kept: Kept,
+    kept: SolverState,
     #[serde(default)]
     frozen: FrozenContacts,
     applied: Vec<StandingForces>,

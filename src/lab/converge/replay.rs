@@ -13,9 +13,9 @@ use crate::engine::clock::Clock;
 use crate::engine::constraints::kernels::motion::{Integrator, MotionInput, RotationUpdate};
 use crate::engine::constraints::kernels::observe::ObservedRule;
 use crate::engine::constraints::kernels::velocity::rules::Softness;
-use crate::engine::constraints::records::kept::{Kept, KeptSize};
+use crate::engine::constraints::records::kept::{SolverState, StateSize};
 use crate::engine::constraints::step::assign::{Assignment, Sides};
-use crate::engine::constraints::{ImpactLaw, OppositeKind, Solver, StepInput, WorkCount, Workspace};
+use crate::engine::constraints::{ImpactLaw, PartnerKind, Solver, StepInput, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
 use crate::engine::lanes::{BodyRow, LaneWidth};
 use crate::engine::narrowphase::lanes::PoseRow;
@@ -113,7 +113,7 @@ pub struct Replay<'a> {
     rows: Vec<BodyRow>,
     /// Rows of the previous step, and the internal state of the solver of this name after it.
     rows_before: Vec<BodyRow>,
-    kept: Option<(&'static str, Kept)>,
+    kept: Option<(&'static str, SolverState)>,
     contacts: Vec<Contact>,
     /// For each contact of the problem: index of its contact here, and of its point in that contact.
     places: Vec<(usize, usize)>,
@@ -275,9 +275,9 @@ impl<'a> Replay<'a> {
         self.solver = Some((variant.make)());
         self.reset_joints(start);
         self.assign_lanes();
-        self.work.kept = Kept::default();
+        self.work.kept = SolverState::default();
         self.work.kept.follow(variant.kept, &self.contacts, self.bodies.len(), true);
-        if start == Start::Warm && variant.kept != KeptSize::default() {
+        if start == Start::Warm && variant.kept != StateSize::default() {
             self.keep(variant);
             self.reset_joints(start);
             self.assign_lanes();
@@ -333,7 +333,7 @@ impl<'a> Replay<'a> {
         };
         let row = |(i, c): (usize, &ProblemContact)| {
             let contact = &self.scratch[self.places[i].0];
-            let against_static = opposite(self.problem, contact.body_a) != OppositeKind::Dynamic;
+            let against_static = partner(self.problem, contact.body_a) != PartnerKind::Dynamic;
             match rule.law(against_static, moved(c) as f32, 1.0 / diagonal[i][0]) {
                 Some(law) => OwnRow { bias: law.bias, compliance: law.compliance },
                 None => OwnRow { bias: OUT_OF_REACH, compliance: 0.0 },
@@ -371,7 +371,7 @@ impl<'a> Replay<'a> {
         let (work, features, contacts) = (&mut self.work, &self.input.features, &self.contacts);
         let solver = self.solver.as_mut();
         let levels = solver.and_then(|solver| solver.levels(&self.bodies, contacts));
-        let sides = Sides { bodies, opposite: |body| opposite(problem, body), levels };
+        let sides = Sides { bodies, partner: |body| partner(problem, body), levels };
         let mut assignment = Assignment::default();
         if self.sequence == Sequence::Colored {
             assignment.colored(work, [self.width; 2], features, contacts, &sides);
@@ -383,11 +383,11 @@ impl<'a> Replay<'a> {
 }
 
 /// The kind of the other body of a contact.
-fn opposite(problem: &ContactProblem, body_a: u32) -> OppositeKind {
+fn partner(problem: &ContactProblem, body_a: u32) -> PartnerKind {
     match problem.bodies.get(body_a as usize) {
-        None => OppositeKind::Static,
-        Some(b) if b.inv_mass == 0.0 && b.inv_inertia == 0.0 => OppositeKind::Kinematic,
-        Some(_) => OppositeKind::Dynamic,
+        None => PartnerKind::Static,
+        Some(b) if b.inv_mass == 0.0 && b.inv_inertia == 0.0 => PartnerKind::Kinematic,
+        Some(_) => PartnerKind::Dynamic,
     }
 }
 

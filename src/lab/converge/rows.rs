@@ -5,8 +5,8 @@
 
 use crate::engine::bodies::Bodies;
 use crate::engine::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
-use crate::engine::constraints::joints::{JointType, Joints, Placing};
-use crate::engine::constraints::kernels::types::Joined;
+use crate::engine::constraints::joints::{JointSetup, JointType, Joints};
+use crate::engine::constraints::kernels::types::ConstraintSet;
 use crate::engine::lanes::Lanes;
 use crate::lab::error::Error;
 use crate::lab::reference::validate::BLOCKS;
@@ -110,7 +110,7 @@ impl JointType for FrozenJoint {
         form.into_iter().flatten().map(|(rows, law)| rows * law.kept()).sum()
     }
 
-    fn place(&self, _: ProblemBlocks, _: Placing<'_>, numbers: &mut [f32]) {
+    fn place(&self, _: ProblemBlocks, _: JointSetup<'_>, numbers: &mut [f32]) {
         numbers.copy_from_slice(&self.numbers);
     }
 
@@ -146,7 +146,7 @@ fn block<L: Lanes, const N: usize>(law: LawForm, numbers: &[L], kept: &mut [L], 
 #[derive(Clone, Debug, Default)]
 pub(super) struct FrozenJoints {
     /// The groups with warm impulses, and the same without.
-    pub groups: [Vec<Joined>; 2],
+    pub groups: [Vec<ConstraintSet>; 2],
     places: Vec<(usize, usize)>,
 }
 
@@ -189,7 +189,7 @@ impl FrozenJoints {
         }
         let groups = groups.map(|groups| {
             let joined = |group| {
-                let mut joined = Joined::new(Box::new(group));
+                let mut joined = ConstraintSet::new(Box::new(group));
                 joined.kind.begin(bodies, h);
                 joined
             };
@@ -202,7 +202,7 @@ impl FrozenJoints {
     pub fn impulses<'a>(
         &'a self,
         problem: &'a ContactProblem,
-        groups: &'a [Joined],
+        groups: &'a [ConstraintSet],
     ) -> impl Iterator<Item = DPair> + 'a {
         problem.joints.iter().zip(&self.places).flat_map(move |(joint, &(group, place))| {
             let kept = groups[group].kind.impulses(place);

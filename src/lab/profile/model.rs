@@ -16,7 +16,7 @@
 use crate::engine::bodies::BodyKind;
 use crate::engine::broadphase::Proxy;
 use crate::engine::clock::Phase;
-use crate::engine::constraints::{Batches, Features, Layout, OppositeKind};
+use crate::engine::constraints::{Batches, Features, Layout, PartnerKind};
 use crate::engine::contacts::quad;
 use crate::engine::lanes::BodyRow;
 use crate::engine::world::World;
@@ -186,8 +186,8 @@ fn over_contacts(
     let mut sum = PassWork::default();
     for (batches, segment) in sets.iter().flat_map(|set| set.segments().iter().map(move |s| (set, s))) {
         let lanes = (segment.batches * batches.width()) as f64;
-        let [read, written] = floats(&Layout::for_features(features, segment.opposite));
-        let gathered = if segment.opposite == OppositeKind::Static { 1.0 } else { 2.0 };
+        let [read, written] = floats(&Layout::for_features(features, segment.partner));
+        let gathered = if segment.partner == PartnerKind::Static { 1.0 } else { 2.0 };
         let pushed = if segment.pushes_a() { 2.0 } else { 1.0 };
         let [gathered, pushed] = if on_bodies { [gathered, pushed] } else { [0.0; 2] };
         sum.read += lanes * (4.0 * read + (4.0 + ROW) * gathered);

@@ -92,7 +92,7 @@ impl Scene {
     ///
     /// Errors: the scene has joints with rows and the solver does not support joints, with its reason.
     pub fn runs_on(&self, solver: &Variant) -> Result<(), Error> {
-        match solver.holds_no_joints {
+        match solver.joints_unsupported {
             Some(reason) if self.joints.iter().any(|joint| joint.kind != JointKind::Filter) => {
                 Err(Error::invalid(&self.name, format!("{} holds no joints: {reason}", solver.name)))
             }

@@ -133,7 +133,7 @@ impl Demand {
 
 /// Checks the conditions on a run, from before its first step.
 #[derive(Clone, Debug)]
-pub struct HoldWatch {
+pub struct SceneMonitor {
     demands: Vec<Demand>,
     start: Vec<DVec2>,
     previous: Vec<DVec2>,
@@ -148,7 +148,7 @@ pub struct HoldWatch {
     broken: Option<Broken>,
 }
 
-impl HoldWatch {
+impl SceneMonitor {
     /// A watch on a world that has not taken a step yet.
     pub fn new(world: &World, demands: impl Into<Vec<Demand>>) -> Self {
         let demands = demands.into();
@@ -172,7 +172,7 @@ impl HoldWatch {
         let weight = |i: usize| BodyState::of(&world.bodies, i, gravity).force.length();
         let dynamic = reach.iter().enumerate().filter(|(_, reach)| reach.is_finite());
         let lift = LIFT * dynamic.map(|(i, reach)| weight(i) * reach).sum::<f64>();
-        HoldWatch {
+        SceneMonitor {
             demands,
             previous: start.clone(),
             start,
@@ -398,7 +398,7 @@ mod tests {
     /// The condition that fails once body `i` is at `place`.
     fn moved(name: &str, demands: &[Demand], i: usize, place: [f32; 2]) -> Option<Mark> {
         let mut world = build(&load(name).unwrap().scene);
-        let mut watch = HoldWatch::new(&world, demands);
+        let mut watch = SceneMonitor::new(&world, demands);
         watch.observe(&world);
         assert_eq!(watch.broken(), None, "{name}");
         [world.bodies.position_x[i], world.bodies.position_y[i]] = place;
@@ -438,7 +438,7 @@ mod tests {
     #[test]
     fn energy_from_nowhere_is_a_blow_up() {
         let mut world = build(&load("bounce").unwrap().scene);
-        let mut watch = HoldWatch::new(&world, [Demand::GainsNoEnergy]);
+        let mut watch = SceneMonitor::new(&world, [Demand::GainsNoEnergy]);
         let fall = |world: &mut World, y: f32, v: f32| {
             (world.bodies.position_y[1], world.bodies.velocity_y[1]) = (y, v);
         };
@@ -475,7 +475,7 @@ mod tests {
         let door = SceneBody::new(BodyKind::Kinematic, [0.0, 0.0], SceneShape::rectangle(0.5, 5.0));
         let ball = SceneBody::dynamic([2.0, 0.0], SceneShape::disc(0.1));
         let mut world = build(&Scene::new("x", vec![door, ball]));
-        let mut watch = HoldWatch::new(&world, []);
+        let mut watch = SceneMonitor::new(&world, []);
         let mut observe = |door: f32, ball: f32| {
             (world.bodies.position_x[0], world.bodies.position_x[1]) = (door, ball);
             watch.observe(&world);

@@ -16,7 +16,7 @@ pub(super) static CASES: &[Case] = &[
         .by(|lab| lab.catalog("free_spin:50", 1e-5 * 100.0)),
     Case::new("A17.momentum", "change of momentum in a collision of 16 bodies, over its absolute sum", "1")
         .within("f32: 1e-6 √sweeps")
-        .required("impulses come in opposite pairs")
+        .required("impulses come in partner pairs")
         .by(|lab| {
             squads(lab, |start, now| {
                 let change = (now.linear[0] - start.linear[0]).hypot(now.linear[1] - start.linear[1]);

@@ -28,7 +28,7 @@ mod vectors;
 
 use methods::{Against, Fault, KeptState, Run, against};
 use simpulse::engine::constraints::numerics::matrix::solve_in_place;
-use simpulse::engine::constraints::records::kept::KeptSize;
+use simpulse::engine::constraints::records::kept::StateSize;
 use simpulse::engine::params::{Budget, Without};
 use simpulse::engine::solvers::{VARIANTS, Variant, find};
 use simpulse::lab::converge::replay::{Replay, Start};
@@ -129,7 +129,7 @@ fn agreement(variant: &'static Variant, fault: Option<Fault>) -> Agreement {
         false => variant.of_iterations(k),
     };
     // Solvers with internal state start without any.
-    let warm = variant.kept == KeptSize::NONE;
+    let warm = variant.kept == StateSize::NONE;
     let (mut apart, mut departures) = (0.0, vec![0.0; source(variant.name).1.len()]);
     for problem in problems() {
         let mut replay = Replay::in_substeps(&problem, variant.defaults(), left_out(variant)).unwrap();

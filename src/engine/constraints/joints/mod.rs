@@ -43,7 +43,7 @@ pub trait JointType: Clone + fmt::Debug + Send + 'static {
     fn kept(form: Self::Form) -> usize;
 
     /// Sets the numbers for the coming step.
-    fn place(&self, form: Self::Form, at: Placing<'_>, numbers: &mut [f32]);
+    fn place(&self, form: Self::Form, at: JointSetup<'_>, numbers: &mut [f32]);
 
     /// States the rows of a joint, given its numbers.
     fn rows<L: Lanes>(form: Self::Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>);
@@ -55,7 +55,7 @@ pub const ANCHORS: usize = 6;
 
 /// The two bodies of a joint at the start of a step.
 #[derive(Debug)]
-pub struct Placing<'a> {
+pub struct JointSetup<'a> {
     /// All bodies.
     pub bodies: &'a Bodies,
     /// Bodies a and b.
@@ -66,7 +66,7 @@ pub struct Placing<'a> {
     pub angle: &'a mut f32,
 }
 
-impl Placing<'_> {
+impl JointSetup<'_> {
     /// A direction in a's frame, turned with a.
     pub fn direction(&self, local: Vec2) -> Vec2 {
         self.bodies.pose(self.ends[0]).rotation.rotate(local)
@@ -98,7 +98,7 @@ pub struct Joints<T: JointType> {
     numbers: Vec<f32>,
     /// `[joints × kept]`
     kept: Vec<f32>,
-    /// Angles (rad); see [`Placing::angle`]. `[joints]`
+    /// Angles (rad); see [`JointSetup::angle`]. `[joints]`
     angles: Vec<f32>,
     /// Impulses of the step; empty unless they are recorded. `[joints]`
     booked: Vec<RecordedImpulses>,
@@ -467,7 +467,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
         for ((joint, ends), (numbers, angle)) in self.joints.iter().zip(&self.ends).zip(places) {
             let [a, b] = ends.map(|i| i as usize);
             let ends = if self.swapped { [b, a] } else { [a, b] };
-            joint.place(self.form, Placing { bodies, ends, h, angle }, numbers);
+            joint.place(self.form, JointSetup { bodies, ends, h, angle }, numbers);
         }
     }
 

@@ -39,7 +39,7 @@
 //! A unit impulse along u changes the velocity along u by k = m_a⁻¹ + m_b⁻¹ + I_a⁻¹ (r_a × u)² + I_b⁻¹ (r_b ×
 //! u)²; the effective mass is 1/k.
 
-use crate::constraints::records::features::{KernelFeatures, Layout, Opposite};
+use crate::constraints::records::features::{KernelFeatures, Layout, Partner};
 use crate::lanes::{LaneIndex, Lanes, RowStore};
 
 pub(crate) const VX: usize = 0;
@@ -59,7 +59,7 @@ pub(crate) struct BodyPair<L> {
 
 impl<L: Lanes> BodyPair<L> {
     #[inline(always)]
-    pub(crate) fn gather<O: Opposite, S: RowStore + ?Sized>(
+    pub(crate) fn gather<O: Partner, S: RowStore + ?Sized>(
         rows: &S,
         row_a: LaneIndex<L::Index>,
         row_b: LaneIndex<L::Index>,
@@ -70,7 +70,7 @@ impl<L: Lanes> BodyPair<L> {
 
     /// As [`Self::gather`], for rows that were not written just before, see [`Lanes::gather_whole`].
     #[inline(always)]
-    pub(crate) fn gather_whole<O: Opposite, S: RowStore + ?Sized>(
+    pub(crate) fn gather_whole<O: Partner, S: RowStore + ?Sized>(
         rows: &S,
         row_a: LaneIndex<L::Index>,
         row_b: LaneIndex<L::Index>,
@@ -81,7 +81,7 @@ impl<L: Lanes> BodyPair<L> {
 
     /// Writes back the velocities of body b, and of body a if `pushes_a`.
     #[inline(always)]
-    pub(crate) fn scatter_velocities<O: Opposite, S: RowStore + ?Sized>(
+    pub(crate) fn scatter_velocities<O: Partner, S: RowStore + ?Sized>(
         &self,
         rows: &mut S,
         row_a: LaneIndex<L::Index>,
@@ -98,7 +98,7 @@ impl<L: Lanes> BodyPair<L> {
 
 /// Components of b − a along n and t.
 #[inline(always)]
-pub(crate) fn to_frame<L: Lanes, O: Opposite>(a: [L; 2], b: [L; 2], n: [L; 2]) -> [L; 2] {
+pub(crate) fn to_frame<L: Lanes, O: Partner>(a: [L; 2], b: [L; 2], n: [L; 2]) -> [L; 2] {
     let x = if O::HAS_ROW { b[0] - a[0] } else { b[0] };
     let y = if O::HAS_ROW { b[1] - a[1] } else { b[1] };
     [n[0].mul_add(x, n[1] * y), n[1].mul_add(x, -(n[0] * y))]
@@ -106,7 +106,7 @@ pub(crate) fn to_frame<L: Lanes, O: Opposite>(a: [L; 2], b: [L; 2], n: [L; 2]) -
 
 /// `base + ω_b arm_b − ω_a arm_a`, if the kernel features include rotation.
 #[inline(always)]
-pub(crate) fn with_arms<L: Lanes, N: KernelFeatures, O: Opposite>(base: L, w: [L; 2], arm: [L; 2]) -> L {
+pub(crate) fn with_arms<L: Lanes, N: KernelFeatures, O: Partner>(base: L, w: [L; 2], arm: [L; 2]) -> L {
     let mut v = base;
     if N::ROTATION {
         v = w[1].mul_add(arm[1], v);
@@ -119,7 +119,7 @@ pub(crate) fn with_arms<L: Lanes, N: KernelFeatures, O: Opposite>(base: L, w: [L
 
 /// `ω_b += I_b⁻¹ arm_b λ`, `ω_a −= I_a⁻¹ arm_a λ`, if the kernel features include rotation.
 #[inline(always)]
-pub(crate) fn spin<L: Lanes, N: KernelFeatures, O: Opposite>(
+pub(crate) fn spin<L: Lanes, N: KernelFeatures, O: Partner>(
     w: &mut [L; 2],
     inertia: [L; 2],
     arm: [L; 2],
@@ -135,7 +135,7 @@ pub(crate) fn spin<L: Lanes, N: KernelFeatures, O: Opposite>(
 
 /// Arms of bodies a and b at point `p`: `axis` 0 is r × n, 1 is r × t.
 #[inline(always)]
-pub(crate) fn arms<L: Lanes, N: KernelFeatures, O: Opposite>(
+pub(crate) fn arms<L: Lanes, N: KernelFeatures, O: Partner>(
     record: &[L],
     layout: &Layout,
     p: usize,
@@ -174,7 +174,7 @@ pub(crate) fn turned<L: Lanes>(arm_n: [L; 2], arm_t: [L; 2], sine: [L; 2], versi
 /// Separation at point `p` (m), see the [module](self). `moved` is n·(Δx_b − Δx_a); `sine` and `versine`
 /// belong to the rotations of a and b.
 #[inline(always)]
-pub(crate) fn separation<L: Lanes, N: KernelFeatures, O: Opposite>(
+pub(crate) fn separation<L: Lanes, N: KernelFeatures, O: Partner>(
     record: &[L],
     p: usize,
     moved: L,
@@ -189,13 +189,7 @@ pub(crate) fn separation<L: Lanes, N: KernelFeatures, O: Opposite>(
 
 /// Rotates the impulses along n and t back into world axes and applies them; `w` are the new spins.
 #[inline(always)]
-pub(crate) fn apply<L: Lanes, O: Opposite>(
-    a: &mut [L; 8],
-    b: &mut [L; 8],
-    n: [L; 2],
-    sum: [L; 2],
-    w: [L; 2],
-) {
+pub(crate) fn apply<L: Lanes, O: Partner>(a: &mut [L; 8], b: &mut [L; 8], n: [L; 2], sum: [L; 2], w: [L; 2]) {
     let x = n[0].mul_add(sum[0], n[1] * sum[1]);
     let y = n[1].mul_add(sum[0], -(n[0] * sum[1]));
     b[VX] = b[INV_MASS].mul_add(x, b[VX]);

@@ -8,7 +8,7 @@ use crate::constraints::kernels::velocity::rules::Softness;
 use crate::constraints::records::batches::{Batches, Part};
 use crate::constraints::records::bounces::Bounces;
 use crate::constraints::records::features::{Features, Kernel, KernelFeatures};
-use crate::constraints::records::kept::Kept;
+use crate::constraints::records::kept::SolverState;
 use crate::contacts::Contact;
 use crate::lanes::{BodyRow, LaneWidth, Lanes};
 
@@ -25,7 +25,7 @@ pub struct PassInput<'a> {
     /// All contacts.
     pub contacts: &'a mut [Contact],
     /// Values that the solver keeps per contact, per contact point and per body.
-    pub kept: &'a mut Kept,
+    pub kept: &'a mut SolverState,
     /// Velocity increments in free flight per substep, `[h aₓ, h a_y, h α, 0]` per row.
     pub increments: &'a [[f32; 4]],
 }

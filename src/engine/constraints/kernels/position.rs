@@ -29,7 +29,7 @@ use crate::constraints::kernels::pass::{Pass, PassInput, PassMode};
 use crate::constraints::kernels::stages::{for_each_batch, over_segments};
 use crate::constraints::records::batches::{Batches, Segment};
 use crate::constraints::records::features::{
-    KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
+    KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
 use crate::lanes::{BodyRow, Lanes};
 
@@ -59,7 +59,7 @@ impl Pass for PositionSweep {
 
 /// One position sweep over a segment.
 #[inline(always)]
-fn position_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
+fn position_segment<L: Lanes, N: KernelFeatures, O: Partner>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,

@@ -5,7 +5,7 @@ use crate::constraints::kernels::pass::{Pass, PassInput};
 use crate::constraints::kernels::stages::over_segments;
 use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
 use crate::constraints::records::features::{
-    KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
+    KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
 use crate::contacts::{Contact, quad};
 use crate::lanes::{BodyRow, Lanes, Quad, prefetch_records};
@@ -24,7 +24,7 @@ const AHEAD: usize = 2;
 /// Lanes without a contact, and points that a contact does not have, get zero effective mass and zero
 /// impulse. Their impulse stays zero at any velocity.
 #[inline(always)]
-fn prepare_segment<L: Lanes, N: KernelFeatures, O: Opposite>(
+fn prepare_segment<L: Lanes, N: KernelFeatures, O: Partner>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,

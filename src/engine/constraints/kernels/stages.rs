@@ -22,7 +22,7 @@
 
 use crate::constraints::kernels::frame::{BodyPair, INV_INERTIA, INV_MASS, VX, VY, W, apply, to_frame};
 use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::constraints::records::features::{KernelFeatures, Layout, Opposite};
+use crate::constraints::records::features::{KernelFeatures, Layout, Partner};
 use crate::lanes::{LaneIndex, Lanes, RowStore, align_frame, prefetch};
 
 /// Runs `$kernel::<L, N, O, …>` over every segment, with `O` chosen by the segment.
@@ -31,8 +31,8 @@ macro_rules! over_segments {
         $crate::lanes::align_frame();
         for i in 0..$batches.visits().len() {
             let segment = $batches.visits()[i];
-            match segment.opposite {
-                OppositeKind::Static => $kernel::<$l, $n, OnStatic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
+            match segment.partner {
+                PartnerKind::Static => $kernel::<$l, $n, OnStatic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
                 _ => $kernel::<$l, $n, OnMoving $(, $r)*>($rows, $batches, &segment $(, $arg)*),
             }
         }
@@ -45,7 +45,7 @@ const PREFETCH_BATCHES: usize = 4;
 
 /// Visits each batch of a segment: `visit(rows, record, row_a, row_b)`.
 #[inline(always)]
-pub(crate) fn for_each_batch<L: Lanes, N: KernelFeatures, O: Opposite, S: RowStore + ?Sized>(
+pub(crate) fn for_each_batch<L: Lanes, N: KernelFeatures, O: Partner, S: RowStore + ?Sized>(
     rows: &mut S,
     batches: &mut Batches,
     segment: &Segment,
@@ -95,21 +95,21 @@ impl<L: Lanes> PairState<L> {
 
     /// m_a⁻¹ + m_b⁻¹ (1/kg).
     #[inline(always)]
-    pub(crate) fn mass_sum<O: Opposite>(&self) -> L {
+    pub(crate) fn mass_sum<O: Partner>(&self) -> L {
         let [[.., mass_a], [.., mass_b]] = self.linear;
         if O::HAS_ROW { mass_a + mass_b } else { mass_b }
     }
 
     /// Linear velocity of b relative to a along n and t, before the rows (m/s).
     #[inline(always)]
-    pub(crate) fn along<O: Opposite>(&self, record: &[L]) -> [L; 2] {
+    pub(crate) fn along<O: Partner>(&self, record: &[L]) -> [L; 2] {
         let [a, b] = self.linear;
         to_frame::<L, O>([a[0], a[1]], [b[0], b[1]], [record[0], record[1]])
     }
 
     /// The bodies with all impulses applied.
     #[inline(always)]
-    fn moved<O: Opposite>(&self, record: &[L]) -> BodyPair<L> {
+    fn moved<O: Partner>(&self, record: &[L]) -> BodyPair<L> {
         let (mut a, mut b) = ([L::zero(); 8], [L::zero(); 8]);
         for (row, linear) in [&mut a, &mut b].into_iter().zip(self.linear) {
             [row[VX], row[VY], row[INV_MASS]] = linear;
@@ -120,7 +120,7 @@ impl<L: Lanes> PairState<L> {
 }
 
 /// A kernel in stages: the work between gathering bodies and scattering them.
-pub(crate) trait Stages<L: Lanes, N: KernelFeatures, O: Opposite>: Copy {
+pub(crate) trait Stages<L: Lanes, N: KernelFeatures, O: Partner>: Copy {
     /// Data of a batch passed from one stage to the next, besides the bodies.
     type Partial: Copy;
 
@@ -149,7 +149,7 @@ pub(crate) fn in_stages<L, N, O, K, S>(rows: &mut S, batches: &mut Batches, segm
 where
     L: Lanes,
     N: KernelFeatures,
-    O: Opposite,
+    O: Partner,
     K: Stages<L, N, O>,
     S: RowStore + ?Sized,
 {
@@ -174,7 +174,7 @@ fn together<L, N, O, K, S>(rows: &mut S, batches: &mut Batches, segment: &Segmen
 where
     L: Lanes,
     N: KernelFeatures,
-    O: Opposite,
+    O: Partner,
     K: Stages<L, N, O>,
     S: RowStore + ?Sized,
 {

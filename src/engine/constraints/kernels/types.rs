@@ -244,7 +244,7 @@ pub struct BodyStates<'a> {
 
 /// A constraint type with the batches of its constraints.
 #[derive(Clone, Debug)]
-pub struct Joined {
+pub struct ConstraintSet {
     /// The type.
     pub kind: Box<dyn ConstraintType>,
     /// Colored batches at the width of the step.
@@ -253,10 +253,10 @@ pub struct Joined {
     pub(crate) serial: Batches,
 }
 
-impl Joined {
+impl ConstraintSet {
     /// A type whose constraints are not yet assigned to lanes.
     pub fn new(kind: Box<dyn ConstraintType>) -> Self {
-        Joined { kind, lanes: Batches::default(), serial: Batches::default() }
+        ConstraintSet { kind, lanes: Batches::default(), serial: Batches::default() }
     }
 
     /// Size of records and indices in bytes.

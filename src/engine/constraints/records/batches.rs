@@ -1,6 +1,6 @@
 //! Assignment of contacts to lanes: batches, segments, and the buffer of records.
 
-use crate::constraints::records::features::{Features, Layout, LayoutOf, OppositeKind};
+use crate::constraints::records::features::{Features, Layout, LayoutOf, PartnerKind};
 use crate::constraints::records::order::SweepOrder;
 pub use crate::constraints::records::segment::Segment;
 use crate::lanes::{Block, IndexList, Indices, LaneIndex, Lanes};
@@ -9,7 +9,7 @@ use std::ops::Range;
 /// Attributes of a new [`Segment`] besides its records.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
-    pub opposite: OppositeKind,
+    pub partner: PartnerKind,
     pub stage: u32,
     pub level: u32,
     pub disjoint: bool,
@@ -125,7 +125,7 @@ impl Batches {
     ) {
         for i in 0..self.visits().len() {
             let segment = self.visits()[i];
-            visit(self, &segment, &layout_of(segment.opposite));
+            visit(self, &segment, &layout_of(segment.partner));
         }
     }
 
@@ -218,20 +218,20 @@ impl Batches {
     /// If the batches have no width yet ([`Self::clear`]).
     pub fn push_segment(
         &mut self,
-        opposite: OppositeKind,
+        partner: PartnerKind,
         layout: &Layout,
         contacts: impl Iterator<Item = (u32, [u32; 2])>,
         inert: u32,
     ) {
         let (stage, disjoint) = (self.segments.len() as u32, self.width > 1);
-        self.push(Place { opposite, stage, level: 0, disjoint }, layout.stride, contacts, inert);
+        self.push(Place { partner, stage, level: 0, disjoint }, layout.stride, contacts, inert);
     }
 
     /// Appends one segment of constraints of any type with records of `stride` lane vectors; see
     /// [`Self::push_segment`].
     pub(crate) fn push(
         &mut self,
-        Place { opposite, stage, level, disjoint }: Place,
+        Place { partner, stage, level, disjoint }: Place,
         stride: usize,
         contacts: impl Iterator<Item = (u32, [u32; 2])>,
         inert: u32,
@@ -266,7 +266,7 @@ impl Batches {
         let first_slot = if disjoint { self.slots.next_multiple_of(16) } else { self.slots };
         self.slots = first_slot + contacts;
         let segment = Segment {
-            opposite,
+            partner,
             first_lane,
             contacts,
             batches,
@@ -384,7 +384,7 @@ impl Batches {
         let static_lanes: usize = self
             .segments
             .iter()
-            .filter(|s| s.opposite == OppositeKind::Static)
+            .filter(|s| s.partner == PartnerKind::Static)
             .map(|s| s.batches * self.width)
             .sum();
         4 * (self.vectors * self.width + 2 * self.contact.len() - static_lanes)
@@ -410,7 +410,7 @@ impl Batches {
     ) {
         let floats: &mut [f32] = bytemuck::cast_slice_mut(&mut self.buffer);
         for segment in &self.segments {
-            let layout = Layout::for_features(features, segment.opposite);
+            let layout = Layout::for_features(features, segment.partner);
             assert!(segment.stride == layout.stride, "records of another layout");
             let record_floats = layout.stride * self.width;
             let start = segment.first_vector * self.width;

@@ -50,13 +50,13 @@ pub trait KernelFeatures: Copy + 'static {
     const POINTS: usize;
 
     /// The layout of this kernel's records for this kind of body a.
-    fn layout(opposite: OppositeKind) -> Layout {
-        Layout::new(Self::ROTATION, Self::FRICTION, Self::POINTS, opposite != OppositeKind::Static)
+    fn layout(partner: PartnerKind) -> Layout {
+        Layout::new(Self::ROTATION, Self::FRICTION, Self::POINTS, partner != PartnerKind::Static)
     }
 }
 
 /// [`KernelFeatures::layout`] as a value.
-pub type LayoutOf = fn(OppositeKind) -> Layout;
+pub type LayoutOf = fn(PartnerKind) -> Layout;
 
 /// The features of one kernel, as a type.
 #[derive(Clone, Copy, Debug)]
@@ -69,12 +69,12 @@ impl<const R: bool, const F: bool, const P: usize> KernelFeatures for Kernel<R, 
 }
 
 /// Kind of body a of a contact; body b is dynamic.
-pub trait Opposite: Copy + 'static {
+pub trait Partner: Copy + 'static {
     /// Whether body a can have a velocity and move, so that its row is gathered.
     const HAS_ROW: bool;
 }
 
-/// A moving body. Whether impulses change its velocity is known per segment ([`OppositeKind`]): the row of
+/// A moving body. Whether impulses change its velocity is known per segment ([`PartnerKind`]): the row of
 /// a dynamic body is written back; that of a kinematic body, with inverse masses of zero, is not.
 #[derive(Clone, Copy, Debug)]
 pub struct OnMoving;
@@ -82,16 +82,16 @@ pub struct OnMoving;
 #[derive(Clone, Copy, Debug)]
 pub struct OnStatic;
 
-impl Opposite for OnMoving {
+impl Partner for OnMoving {
     const HAS_ROW: bool = true;
 }
-impl Opposite for OnStatic {
+impl Partner for OnStatic {
     const HAS_ROW: bool = false;
 }
 
 /// [`Opposite`] as a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum OppositeKind {
+pub enum PartnerKind {
     /// A dynamic body: impulses change its velocity.
     Dynamic,
     /// A kinematic body: it moves, but impulses do not change its velocity.
@@ -100,9 +100,9 @@ pub enum OppositeKind {
     Static,
 }
 
-impl OppositeKind {
+impl PartnerKind {
     /// All kinds.
-    pub const ALL: [OppositeKind; 3] = [OppositeKind::Dynamic, OppositeKind::Kinematic, OppositeKind::Static];
+    pub const ALL: [PartnerKind; 3] = [PartnerKind::Dynamic, PartnerKind::Kinematic, PartnerKind::Static];
 }
 
 /// Offset of each quantity in a constraint record, in lane vectors.
@@ -176,14 +176,14 @@ impl Layout {
     }
 
     /// The layout of a kernel.
-    pub const fn of<N: KernelFeatures, O: Opposite>() -> Layout {
+    pub const fn of<N: KernelFeatures, O: Partner>() -> Layout {
         Layout::new(N::ROTATION, N::FRICTION, N::POINTS, O::HAS_ROW)
     }
 
     /// The layout for features that are known at run time.
-    pub fn for_features(features: &Features, opposite: OppositeKind) -> Layout {
+    pub fn for_features(features: &Features, partner: PartnerKind) -> Layout {
         let points = if features.two_points { 2 } else { 1 };
-        Layout::new(features.rotation, features.friction, points, opposite != OppositeKind::Static)
+        Layout::new(features.rotation, features.friction, points, partner != PartnerKind::Static)
     }
 
     /// Number of floats for the arms of a point.
@@ -198,8 +198,8 @@ impl Layout {
     }
 
     /// Bytes per contact: its share of the record, and the body indices.
-    pub const fn bytes(&self, opposite: OppositeKind) -> usize {
-        4 * self.stride + if matches!(opposite, OppositeKind::Static) { 4 } else { 8 }
+    pub const fn bytes(&self, partner: PartnerKind) -> usize {
+        4 * self.stride + if matches!(partner, PartnerKind::Static) { 4 } else { 8 }
     }
 }
 
@@ -240,11 +240,11 @@ mod tests {
 
     #[test]
     fn a_two_point_manifold_costs_92_bytes_and_a_bare_disc_28() {
-        let full = Layout::for_features(&Features::FULL, OppositeKind::Dynamic);
-        assert_eq!(full.bytes(OppositeKind::Dynamic), 92);
-        let on_ground = Layout::for_features(&Features::FULL, OppositeKind::Static);
-        assert_eq!(on_ground.bytes(OppositeKind::Static), 72);
-        let bare = Layout::for_features(&Features::NONE, OppositeKind::Dynamic);
-        assert_eq!(bare.bytes(OppositeKind::Dynamic), 28);
+        let full = Layout::for_features(&Features::FULL, PartnerKind::Dynamic);
+        assert_eq!(full.bytes(PartnerKind::Dynamic), 92);
+        let on_ground = Layout::for_features(&Features::FULL, PartnerKind::Static);
+        assert_eq!(on_ground.bytes(PartnerKind::Static), 72);
+        let bare = Layout::for_features(&Features::NONE, PartnerKind::Dynamic);
+        assert_eq!(bare.bytes(PartnerKind::Dynamic), 28);
     }
 }

@@ -10,7 +10,7 @@ use crate::lanes::LaneVec;
 /// How many numbers a solver keeps from step to step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct KeptSize {
+pub struct StateSize {
     /// Floats per contact, a multiple of four.
     pub per_contact: usize,
     /// Floats per contact point.
@@ -19,16 +19,16 @@ pub struct KeptSize {
     pub per_body: usize,
 }
 
-impl KeptSize {
+impl StateSize {
     /// Nothing is kept.
-    pub const NONE: KeptSize = KeptSize { per_contact: 0, per_point: 0, per_body: 0 };
+    pub const NONE: StateSize = StateSize { per_contact: 0, per_point: 0, per_body: 0 };
 }
 
 /// The kept numbers; see the [module](self).
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Kept {
-    size: KeptSize,
+pub struct SolverState {
+    size: StateSize,
     /// Shape pair and feature ids of each contact, by which its numbers are found again.
     names: Vec<(u64, [u32; 2])>,
     /// `[contacts × per_contact]`
@@ -48,9 +48,9 @@ pub struct Kept {
 /// Feature id of a point that is not in use. No contact has it.
 const UNUSED: u32 = u32::MAX;
 
-impl Kept {
+impl SolverState {
     /// Floats per contact, contact point and body.
-    pub fn size(&self) -> KeptSize {
+    pub fn size(&self) -> StateSize {
         self.size
     }
 
@@ -89,7 +89,7 @@ impl Kept {
 
     /// Whether the arrays of contacts and points have the right lengths. Data from a file may not.
     pub fn is_consistent(&self) -> bool {
-        let (KeptSize { per_contact, per_point, .. }, contacts) = (self.size, self.names.len());
+        let (StateSize { per_contact, per_point, .. }, contacts) = (self.size, self.names.len());
         self.points.len() == 2 * contacts * per_point && self.contacts.len() == contacts * per_contact
     }
 
@@ -116,9 +116,9 @@ impl Kept {
 
     /// Assigns the numbers to the contacts of the coming step, which are sorted by shape pair. `changed`:
     /// contacts may have come or gone since the last call.
-    pub fn follow(&mut self, size: KeptSize, contacts: &[Contact], bodies: usize, changed: bool) {
+    pub fn follow(&mut self, size: StateSize, contacts: &[Contact], bodies: usize, changed: bool) {
         if size != self.size {
-            *self = Kept { size, ..Kept::default() };
+            *self = SolverState { size, ..SolverState::default() };
         }
         self.bodies.resize(bodies * size.per_body, 0.0);
         let is_same = !changed && self.names.len() == contacts.len();
@@ -177,8 +177,8 @@ mod tests {
 
     #[test]
     fn numbers_follow_the_feature_through_sorting_and_exchange() {
-        let size = KeptSize { per_contact: 4, per_point: 1, per_body: 2 };
-        let mut kept = Kept::default();
+        let size = StateSize { per_contact: 4, per_point: 1, per_body: 2 };
+        let mut kept = SolverState::default();
         kept.follow(size, &[contact([0, 2], &[5, 9]), contact([1, 2], &[0])], 3, true);
         kept.contact(0)[3] = 12.0;
         kept.point(0, 0)[0] = 5.0;
@@ -194,7 +194,7 @@ mod tests {
         kept.follow(size, &[contact([0, 2], &[9, 6])], 4, false);
         assert_eq!(kept.points(), [9.0, 0.0]);
         // Another solver keeps other numbers.
-        kept.follow(KeptSize::default(), &[contact([0, 2], &[9, 6])], 4, false);
+        kept.follow(StateSize::default(), &[contact([0, 2], &[9, 6])], 4, false);
         assert!(kept.points().is_empty());
     }
 }

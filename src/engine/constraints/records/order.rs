@@ -81,13 +81,13 @@ pub(crate) fn mixed(x: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::constraints::records::features::OppositeKind;
+    use crate::constraints::records::features::PartnerKind;
 
     fn segment(stage: u32, first_lane: usize, contacts: usize, disjoint: bool) -> Segment {
-        let opposite = OppositeKind::Dynamic;
+        let partner = PartnerKind::Dynamic;
         let (batches, stride) = (contacts, 5);
         Segment {
-            opposite,
+            partner,
             first_lane,
             contacts,
             batches,

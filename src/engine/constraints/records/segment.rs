@@ -1,6 +1,6 @@
 //! Segments: the batches that one kernel runs over.
 
-use crate::constraints::records::features::OppositeKind;
+use crate::constraints::records::features::PartnerKind;
 
 /// Batches of one color and one kind of body a, which one kernel runs over.
 ///
@@ -8,7 +8,7 @@ use crate::constraints::records::features::OppositeKind;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Segment {
     /// Kind of body a.
-    pub opposite: OppositeKind,
+    pub partner: PartnerKind,
     /// First lane slot (a multiple of the width).
     pub first_lane: usize,
     /// Number of lanes that hold a contact. They come first; the rest of the last batch is padding.
@@ -35,7 +35,7 @@ impl Segment {
     /// Whether impulses change body a as well, so that its row is written back.
     #[inline(always)]
     pub fn pushes_a(&self) -> bool {
-        self.opposite == OppositeKind::Dynamic
+        self.partner == PartnerKind::Dynamic
     }
 
     /// Number of lanes of a batch that hold a contact.

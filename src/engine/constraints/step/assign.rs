@@ -3,7 +3,7 @@
 use super::Workspace;
 use crate::coloring::{Coloring, EXEMPT};
 use crate::constraints::records::batches::Place;
-use crate::constraints::records::features::{Features, Layout, OppositeKind};
+use crate::constraints::records::features::{Features, Layout, PartnerKind};
 use crate::constraints::records::graph::{Graph, UNSUPPORTED};
 use crate::constraints::records::order::mixed;
 use crate::contacts::Contact;
@@ -40,7 +40,7 @@ struct Group {
 /// Assigns lanes to constraints; keeps its memory from call to call.
 #[derive(Clone, Debug, Default)]
 pub struct Assignment {
-    /// One group per [`OppositeKind`].
+    /// One group per [`PartnerKind`].
     groups: [Group; 3],
     /// Entries of one color.
     color: Vec<Assigned>,
@@ -57,7 +57,7 @@ pub struct Sides<'a, F> {
     /// Number of bodies. The row with this index is the inert one.
     pub bodies: usize,
     /// Kind of body a. The other body of the constraint, b, is dynamic.
-    pub opposite: F,
+    pub partner: F,
     /// The graph by whose levels contacts are grouped, if they are.
     pub levels: Option<&'a Graph>,
 }
@@ -87,7 +87,7 @@ impl Assignment {
         widths: [LaneWidth; 2],
         features: &Features,
         contacts: &[Contact],
-        sides: &Sides<'_, impl Fn(u32) -> OppositeKind>,
+        sides: &Sides<'_, impl Fn(u32) -> PartnerKind>,
     ) {
         (self.colors, self.overflow) = (0, 0);
         for group in &mut self.groups {
@@ -99,10 +99,10 @@ impl Assignment {
             joined.kind.ends().iter().enumerate().map(move |(i, &rows)| (k as u32 + 1, i, rows))
         });
         for (kind, index, rows) in all.chain(types) {
-            let opposite = (sides.opposite)(rows[0]);
-            let group = &mut self.groups[opposite as usize];
+            let partner = (sides.partner)(rows[0]);
+            let group = &mut self.groups[partner as usize];
             group.entries.push(Assigned { level: sides.level(rows), kind, index: index as u32, rows });
-            let a = if opposite == OppositeKind::Dynamic { rows[0] } else { EXEMPT };
+            let a = if partner == PartnerKind::Dynamic { rows[0] } else { EXEMPT };
             group.edges.push([a, rows[1]]);
         }
         for Group { edges, coloring, .. } in &mut self.groups {
@@ -113,7 +113,7 @@ impl Assignment {
         let inert = sides.bodies as u32;
         let color = &mut self.color;
         let mut stage = 0;
-        for (Group { entries, coloring, .. }, opposite) in self.groups.iter_mut().zip(OppositeKind::ALL) {
+        for (Group { entries, coloring, .. }, partner) in self.groups.iter_mut().zip(PartnerKind::ALL) {
             for of_color in 0..=coloring.colors() {
                 let serial = of_color == coloring.colors();
                 let edges = if serial { coloring.overflow() } else { coloring.color(of_color) };
@@ -125,7 +125,7 @@ impl Assignment {
                 for run in color.chunk_by(|a, b| a.place() == b.place()) {
                     let Assigned { level, kind, .. } = run[0];
                     let place =
-                        Place { opposite, stage: level * STAGES_PER_LEVEL + stage, level, disjoint: !serial };
+                        Place { partner, stage: level * STAGES_PER_LEVEL + stage, level, disjoint: !serial };
                     work.push(kind, place, features, run.iter().map(|e| (e.index, e.rows)), inert);
                 }
                 self.overflow += if serial { edges.len() } else { 0 };
@@ -153,7 +153,7 @@ impl Assignment {
         work: &mut Workspace,
         features: &Features,
         contacts: &[Contact],
-        sides: &Sides<'_, impl Fn(u32) -> OppositeKind>,
+        sides: &Sides<'_, impl Fn(u32) -> PartnerKind>,
     ) {
         let mut places = std::mem::take(&mut self.places);
         places.clear();
@@ -174,7 +174,7 @@ impl Assignment {
         features: &Features,
         contacts: &[Contact],
         order: impl Iterator<Item = u32>,
-        sides: &Sides<'_, impl Fn(u32) -> OppositeKind>,
+        sides: &Sides<'_, impl Fn(u32) -> PartnerKind>,
     ) {
         work.clear_lanes(1);
         (self.colors, self.overflow) = (0, 0);
@@ -199,10 +199,10 @@ impl Assignment {
         if sides.levels.is_some() {
             list.sort_by_key(|e| e.level);
         }
-        let place = |e: &Assigned| (e.place(), (sides.opposite)(e.rows[0]));
+        let place = |e: &Assigned| (e.place(), (sides.partner)(e.rows[0]));
         for (stage, run) in list.chunk_by(|i, j| place(i) == place(j)).enumerate() {
-            let ((level, kind), opposite) = place(&run[0]);
-            let place = Place { opposite, stage: stage as u32, level, disjoint: false };
+            let ((level, kind), partner) = place(&run[0]);
+            let place = Place { partner, stage: stage as u32, level, disjoint: false };
             work.push(kind, place, features, run.iter().map(|e| (e.index, e.rows)), sides.bodies as u32);
         }
         work.finish_lanes();
@@ -229,7 +229,7 @@ impl Workspace {
         let (batches, stride) = match self.types.get_mut((kind as usize).wrapping_sub(1)) {
             Some(t) => ([&mut t.lanes, &mut t.serial], t.kind.stride()),
             None => {
-                let layout = Layout::for_features(features, place.opposite);
+                let layout = Layout::for_features(features, place.partner);
                 ([&mut self.lanes, &mut self.serial], layout.stride)
             }
         };

@@ -21,10 +21,10 @@ pub use workspace::{IterationObserver, StepInput, Watch, WorkCount, Workspace};
 use crate::clock::{Clock, Phase};
 use crate::constraints::kernels::pass::{AnyPass, PassInput, PassMode};
 use crate::constraints::kernels::prepare::{Prepare, Store};
-use crate::constraints::kernels::types::{Joined, TypeInput, TypeRows};
+use crate::constraints::kernels::types::{ConstraintSet, TypeInput, TypeRows};
 use crate::constraints::kernels::velocity::rules::Softness;
 use crate::constraints::records::batches::{Batches, Part};
-use crate::constraints::records::kept::Kept;
+use crate::constraints::records::kept::SolverState;
 use crate::constraints::records::order::SweepOrder;
 use crate::constraints::vectors::system::Others;
 use crate::contacts::Contact;
@@ -155,7 +155,7 @@ impl<'a> Passes<'a> {
     }
 
     /// Numbers that the solver keeps per contact, contact point and body; see `Variant::kept`.
-    pub fn kept(&mut self) -> &mut Kept {
+    pub fn kept(&mut self) -> &mut SolverState {
         &mut self.work.kept
     }
 
@@ -281,7 +281,7 @@ impl<'a> Passes<'a> {
     fn over_types(&mut self, phase: Phase, pass: &mut dyn AnyPass, part: Part, rank: u64) {
         let (width, mode, law, driven) = (self.width_of(part), pass.mode_of(), pass.law_of(), self.driven);
         let Workspace { rows, types, poses, .. } = &mut *self.work;
-        for Joined { kind, lanes, serial } in types {
+        for ConstraintSet { kind, lanes, serial } in types {
             let batches = part.of(lanes, serial);
             if batches.next_rank() == Some(rank) {
                 batches.focus_on(rank);

@@ -2,9 +2,9 @@
 
 use super::Passes;
 use crate::bodies::Bodies;
-use crate::constraints::kernels::types::Joined;
+use crate::constraints::kernels::types::ConstraintSet;
 use crate::constraints::records::graph::Graph;
-use crate::constraints::records::kept::Kept;
+use crate::constraints::records::kept::SolverState;
 use crate::contacts::Contact;
 use crate::narrowphase::candidate::Candidates;
 use crate::narrowphase::circles::Rolling;
@@ -59,9 +59,9 @@ pub struct CollisionScene<'a> {
     /// Contacts, sorted by shape pair.
     pub contacts: &'a mut [Contact],
     /// Numbers that the solver keeps per contact, contact point and body, in the order of `contacts`.
-    pub kept: &'a mut Kept,
+    pub kept: &'a mut SolverState,
     /// Constraints of other types than contacts.
-    pub types: &'a [Joined],
+    pub types: &'a [ConstraintSet],
     /// Pairs of shapes that may touch.
     pub candidates: Candidates<'a>,
     /// Whether contacts have come or gone since they got their lanes. Valid after the collision.

@@ -2,7 +2,7 @@
 
 use super::{Passes, Workspace};
 use crate::clock::Phase;
-use crate::constraints::kernels::types::Joined;
+use crate::constraints::kernels::types::ConstraintSet;
 use crate::constraints::records::point_vector::PointVector;
 use crate::constraints::vectors::system::{Others, System};
 use crate::lanes::Block;
@@ -25,7 +25,7 @@ impl Passes<'_> {
     /// next step.
     pub fn vector(&mut self) -> PointVector {
         let mut vector = self.work.vectors.pop().unwrap_or_default();
-        let rows = self.work.types.iter().map(Joined::vector_rows).sum();
+        let rows = self.work.types.iter().map(ConstraintSet::vector_rows).sum();
         vector.reset([&self.work.lanes, &self.work.serial], rows);
         vector
     }

@@ -3,10 +3,10 @@
 use crate::constraints::impacts::{ImpactLaw, ImpactRecords};
 use crate::constraints::kernels::motion::Motion;
 use crate::constraints::kernels::observe::ObservedRule;
-use crate::constraints::kernels::types::Joined;
+use crate::constraints::kernels::types::ConstraintSet;
 use crate::constraints::records::batches::Batches;
 use crate::constraints::records::features::Features;
-use crate::constraints::records::kept::Kept;
+use crate::constraints::records::kept::SolverState;
 use crate::constraints::records::point_vector::PointVector;
 use crate::constraints::vectors::system::System;
 use crate::lanes::BodyRow;
@@ -26,11 +26,11 @@ pub struct Workspace {
     /// Contacts that are solved one after the other: all of them in natural order, otherwise the overflow.
     pub serial: Batches,
     /// Constraints of other types than contacts.
-    pub types: Vec<Joined>,
+    pub types: Vec<ConstraintSet>,
     /// Poses at the start of the step, one per row, if there are such constraints.
     pub poses: Vec<PoseRow>,
     /// Numbers that a solver keeps per contact, per contact point and per body.
-    pub kept: Kept,
+    pub kept: SolverState,
     /// Side records for restitution; empty in scenes without restitution.
     pub impacts: ImpactRecords,
     /// Vectors that solvers have returned, for reuse.

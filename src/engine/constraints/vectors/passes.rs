@@ -146,7 +146,7 @@ fn each_batch<L: Lanes>(
     let vector: &mut [L] = bytemuck::cast_slice_mut(vector);
     for i in 0..batches.segments().len() {
         let segment = batches.segments()[i];
-        let layout = Layout::for_features(features, segment.opposite);
+        let layout = Layout::for_features(features, segment.partner);
         let SegmentRecords { mut records, row_a, row_b, .. } = batches.records_of::<L>(&segment, &layout);
         let mut slot = segment.first_slot;
         for (row_a, row_b) in row_a.batches().zip(row_b.batches()) {

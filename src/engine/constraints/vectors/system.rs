@@ -9,7 +9,7 @@
 
 use crate::clock::Phase;
 use crate::constraints::kernels::pass::{PassMode, VectorTask, at_width};
-use crate::constraints::kernels::types::{Joined, TypeInput, TypeRows};
+use crate::constraints::kernels::types::{ConstraintSet, TypeInput, TypeRows};
 use crate::constraints::kernels::velocity::rules::Softness;
 use crate::constraints::numerics::cone;
 use crate::constraints::records::batches::{Batches, Part};
@@ -35,7 +35,7 @@ pub struct System<'a> {
 
 /// Constraints of types other than contacts.
 pub(crate) struct Others<'a> {
-    pub types: &'a mut [Joined],
+    pub types: &'a mut [ConstraintSet],
     pub poses: &'a [PoseRow],
     /// Length of the substep (s).
     pub h: f32,
@@ -54,7 +54,7 @@ impl Others<'_> {
         [mut x, mut y]: [&mut [Block]; 2],
     ) {
         let &mut Others { ref mut types, poses, h, driven } = self;
-        for Joined { kind, lanes, serial } in types.iter_mut() {
+        for ConstraintSet { kind, lanes, serial } in types.iter_mut() {
             for part in [Part::Lanes, Part::Serial] {
                 let width = match part {
                     Part::Lanes => width,

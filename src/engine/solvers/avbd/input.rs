@@ -1,8 +1,8 @@
 //! Inputs of the passes of block descent.
 
-use crate::constraints::kernels::types::Joined;
+use crate::constraints::kernels::types::ConstraintSet;
 use crate::constraints::records::graph::Graph;
-use crate::constraints::records::kept::Kept;
+use crate::constraints::records::kept::SolverState;
 use crate::contacts::Contact;
 use crate::lanes::BodyRow;
 use crate::narrowphase::lanes::PoseRow;
@@ -13,7 +13,7 @@ pub(crate) const PENALTY: [f32; 2] = [1.0, 1e9];
 /// Inputs of a pass of block descent.
 pub(crate) struct DescentInput<'a> {
     pub rows: &'a mut [BodyRow],
-    pub kept: &'a mut Kept,
+    pub kept: &'a mut SolverState,
     pub contacts: &'a [Contact],
     /// h a of each body, see [`Motion::velocity_increments`](crate::constraints::kernels::motion::Motion).
     pub increments: &'a [[f32; 4]],
@@ -21,7 +21,7 @@ pub(crate) struct DescentInput<'a> {
     pub bodies: usize,
     pub rotation: bool,
     pub friction: bool,
-    pub types: &'a mut [Joined],
+    pub types: &'a mut [ConstraintSet],
     pub poses: &'a [PoseRow],
     /// Edges are the contacts and, after them, joints.
     pub graph: &'a Graph,

@@ -24,7 +24,7 @@
 
 use super::input::{DescentInput, PENALTY};
 use crate::constraints::joints::rows::{RowBlock, RowLaw};
-use crate::constraints::kernels::types::{BodyStates, Joined};
+use crate::constraints::kernels::types::{BodyStates, ConstraintSet};
 use crate::constraints::records::rows::ROWS;
 
 /// Numbers per row of a block.
@@ -72,7 +72,7 @@ impl JointDescent {
     }
 
     /// Lists the joints. Penalties are kept as long as the joints stay the same.
-    pub fn assign(&mut self, types: &mut [Joined], on: BodyStates<'_>) {
+    pub fn assign(&mut self, types: &mut [ConstraintSet], on: BodyStates<'_>) {
         self.places.clear();
         self.starts.clear();
         self.found.clear();

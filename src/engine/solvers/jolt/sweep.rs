@@ -10,7 +10,7 @@ use crate::constraints::kernels::velocity::rules::{NormalRule, Rigid};
 use crate::constraints::numerics::cone;
 use crate::constraints::records::batches::{Batches, Segment};
 use crate::constraints::records::features::{
-    KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
+    KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
 use crate::lanes::{BodyRow, Lanes};
 
@@ -26,7 +26,7 @@ impl Pass for ContactFriction {
 }
 
 #[inline(always)]
-fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
+fn sweep<L: Lanes, N: KernelFeatures, O: Partner>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,

@@ -50,7 +50,7 @@
 
 use crate::bodies::{Bodies, BodyKind};
 use crate::constraints::Passes;
-use crate::constraints::kernels::types::Joined;
+use crate::constraints::kernels::types::ConstraintSet;
 use crate::constraints::step::CollisionScene;
 use crate::contacts::{Contact, ManifoldPoint};
 use crate::disjoint::DisjointSets;
@@ -157,7 +157,7 @@ impl Jams {
 
     /// Replaces welded bodies of deep contacts by the non-dynamic body that holds them, except within one
     /// set.
-    fn hold(&mut self, types: &[Joined], bodies: &Bodies) {
+    fn hold(&mut self, types: &[ConstraintSet], bodies: &Bodies) {
         let welds =
             || types.iter().filter(|joined| joined.kind.rigid_size() == 3).flat_map(|j| j.kind.ends());
         if welds().next().is_none() {

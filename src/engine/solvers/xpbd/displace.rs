@@ -35,7 +35,7 @@ use crate::constraints::kernels::stages::{for_each_batch, over_segments};
 use crate::constraints::numerics::cone;
 use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
 use crate::constraints::records::features::{
-    KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
+    KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
 use crate::constraints::records::point_vector::places;
 use crate::lanes::{Block, BodyRow, LaneIndex, Lanes, RowStore};
@@ -144,7 +144,7 @@ impl RowStore for Displaced<'_> {
 }
 
 #[inline(always)]
-fn displace<L: Lanes, N: KernelFeatures, O: Opposite>(
+fn displace<L: Lanes, N: KernelFeatures, O: Partner>(
     store: &mut Displaced<'_>,
     batches: &mut Batches,
     segment: &Segment,
@@ -246,7 +246,7 @@ fn correct_all<L: Lanes, N: KernelFeatures, const BOUNCES: bool>(
 }
 
 #[inline(always)]
-fn correct<L: Lanes, N: KernelFeatures, O: Opposite, const BOUNCES: bool>(
+fn correct<L: Lanes, N: KernelFeatures, O: Partner, const BOUNCES: bool>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,

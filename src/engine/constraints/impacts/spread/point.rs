@@ -138,7 +138,7 @@ impl PropagationInput<'_> {
         let segment = batches.segments().iter().find(holds).expect("a segment for each lane");
         let in_segment = of - segment.first_lane;
         let vector = segment.first_vector + in_segment / width * segment.stride;
-        let layout = Layout::for_features(self.features, segment.opposite);
+        let layout = Layout::for_features(self.features, segment.partner);
         LanePlace {
             part,
             of,

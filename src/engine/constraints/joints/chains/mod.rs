@@ -72,7 +72,7 @@
 pub(super) mod records;
 mod system;
 
-use crate::constraints::kernels::types::Joined;
+use crate::constraints::kernels::types::ConstraintSet;
 use crate::constraints::kernels::velocity::masses::ScaledMasses;
 use crate::constraints::records::links::{ChainLink, LinkRule};
 use crate::lanes::BodyRow;
@@ -119,7 +119,7 @@ struct ChainSearch {
 
 impl Chains {
     /// Finds the chains among the joints of these types, if joints or bodies have changed.
-    pub fn find(&mut self, types: &[Joined], rows: &[BodyRow]) {
+    pub fn find(&mut self, types: &[ConstraintSet], rows: &[BodyRow]) {
         let is_same = self.moves.len() == rows.len()
             && self.moves.iter().zip(rows).all(|(&moves, row)| moves == moves_by_impulses(row))
             && self.ends.iter().eq(types.iter().flat_map(|t| t.kind.ends()));
@@ -137,7 +137,7 @@ impl Chains {
     }
 
     /// Assigns links to slots of the system.
-    fn lay_out(&mut self, types: &[Joined]) {
+    fn lay_out(&mut self, types: &[ConstraintSet]) {
         let Chains { links, system, search, .. } = self;
         let type_of = |joint: u32| &types[search.places[joint as usize][0] as usize].kind;
         let size = search.found.iter().map(|&(joint, ..)| type_of(joint).rigid_size()).max().unwrap_or(0);
@@ -166,7 +166,7 @@ impl Chains {
     }
 
     /// Marks the joints that are links in their types, so that sweeps skip their rigid rows.
-    pub fn disable_rows(&self, types: &mut [Joined], poses: &[PoseRow]) {
+    pub fn disable_rows(&self, types: &mut [ConstraintSet], poses: &[PoseRow]) {
         for (joined, links) in types.iter_mut().zip(&self.links) {
             joined.kind.link(links, poses);
         }
@@ -176,7 +176,7 @@ impl Chains {
     /// `length_unit`: size of typical bodies (m).
     pub fn share_masses(
         &mut self,
-        types: &mut [Joined],
+        types: &mut [ConstraintSet],
         rows: &[BodyRow],
         length_unit: f32,
         pairs: impl Iterator<Item = [u32; 2]>,
@@ -215,7 +215,7 @@ impl Chains {
         }
     }
 
-    fn write_rows(&mut self, types: &mut [Joined], rows: &[BodyRow], by: LinkRule) {
+    fn write_rows(&mut self, types: &mut [ConstraintSet], rows: &[BodyRow], by: LinkRule) {
         for (joined, links) in types.iter_mut().zip(&self.links) {
             if !links.is_empty() {
                 joined.kind.link_rows(rows, by, self.system.rows());
@@ -227,7 +227,7 @@ impl Chains {
     /// typical bodies (m). Returns whether there was something to solve.
     pub fn solve(
         &mut self,
-        types: &mut [Joined],
+        types: &mut [ConstraintSet],
         rows: &mut [BodyRow],
         [h, length_unit]: [f32; 2],
         stage: ChainStage,
@@ -251,7 +251,7 @@ impl Chains {
     }
 
     /// Copies the impulses to the types.
-    pub fn give_impulses(&self, types: &mut [Joined]) {
+    pub fn give_impulses(&self, types: &mut [ConstraintSet]) {
         for (joined, links) in types.iter_mut().zip(&self.links) {
             if !links.is_empty() {
                 joined.kind.set_linked(self.system.impulses());
@@ -310,7 +310,7 @@ impl ChainSearch {
     }
 
     /// Lists the joints of each body.
-    fn list(&mut self, types: &[Joined], moves: &[bool]) {
+    fn list(&mut self, types: &[ConstraintSet], moves: &[bool]) {
         let ChainSearch { starts, joined, places, ends, .. } = self;
         places.clear();
         ends.clear();

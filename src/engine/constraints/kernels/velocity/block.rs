@@ -52,7 +52,7 @@ use crate::constraints::kernels::velocity::rules::Softness;
 use crate::constraints::kernels::velocity::sweep::{NormalRule, Rows, unbounded_friction};
 use crate::constraints::records::batches::{Batches, Segment};
 use crate::constraints::records::features::{
-    KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
+    KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
 use crate::lanes::{BodyRow, Lanes};
 
@@ -101,7 +101,7 @@ struct PartialBlock<L> {
 }
 
 #[inline(always)]
-fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, const NORMAL_FIRST: bool>(
+fn segment<L: Lanes, N: KernelFeatures, O: Partner, R: NormalRule, const NORMAL_FIRST: bool>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,
@@ -113,7 +113,7 @@ fn segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, const NORMAL
 /// Solves the friction rows of a batch, bounded by the normal impulses in its record. `along_t` is the
 /// current linear velocity of b relative to a along t (m/s).
 #[inline(always)]
-fn friction_rows<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule>(
+fn friction_rows<L: Lanes, N: KernelFeatures, O: Partner, R: NormalRule>(
     record: &mut [L],
     rule: R,
     mut along_t: L,
@@ -140,7 +140,7 @@ impl<L, N, O, R, const NORMAL_FIRST: bool> Stages<L, N, O> for InBlocks<R, NORMA
 where
     L: Lanes,
     N: KernelFeatures,
-    O: Opposite,
+    O: Partner,
     R: NormalRule,
 {
     type Partial = PartialBlock<L>;

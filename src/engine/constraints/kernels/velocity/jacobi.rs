@@ -11,7 +11,7 @@ use crate::constraints::kernels::pass::{Pass, PassInput, PassMode};
 use crate::constraints::kernels::stages::over_segments;
 use crate::constraints::kernels::velocity::rules::{NormalRule, Relaxed, Soft, Softness};
 use crate::constraints::kernels::velocity::sweep::sweep_segment;
-use crate::constraints::records::features::{KernelFeatures, OnMoving, OnStatic, OppositeKind};
+use crate::constraints::records::features::{KernelFeatures, OnMoving, OnStatic, PartnerKind};
 use crate::lanes::{BodyRow, IndexList, LaneIndex, Lanes, RowStore};
 
 /// A Jacobi sweep under the soft rule, which is the rigid rule if it has no springs.

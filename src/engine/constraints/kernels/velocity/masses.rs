@@ -9,7 +9,7 @@ use crate::constraints::kernels::pass::{Pass, PassInput, PassMode};
 use crate::constraints::kernels::stages::{for_each_batch, over_segments};
 use crate::constraints::records::batches::{Batches, Segment};
 use crate::constraints::records::features::{
-    KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
+    KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
 use crate::lanes::{BodyRow, LaneIndex, Lanes};
 
@@ -80,7 +80,7 @@ impl Pass for EffectiveMasses<'_> {
 }
 
 #[inline(always)]
-fn segment<L: Lanes, N: KernelFeatures, O: Opposite>(
+fn segment<L: Lanes, N: KernelFeatures, O: Partner>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,

@@ -15,7 +15,7 @@
 //!
 //! with σ = sin Δθ and κ = 1 − cos Δθ, since t·r = r × n. The drift from earlier steps is stored per point.
 //!
-//! Drifts follow contacts from step to step in [`Kept`]. Within a step they are in lane order, in the
+//! Drifts follow contacts from step to step in [`SolverState`]. Within a step they are in lane order, in the
 //! tangential entries of a vector laid out as a
 //! [`crate::constraints::records::point_vector::PointVector`], so a sweep reads and writes them
 //! without gathering.
@@ -38,9 +38,9 @@ use crate::constraints::kernels::velocity::rules::Softness;
 use crate::constraints::numerics::cone;
 use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
 use crate::constraints::records::features::{
-    KernelFeatures, Layout, LayoutOf, OnMoving, OnStatic, Opposite, OppositeKind,
+    KernelFeatures, Layout, LayoutOf, OnMoving, OnStatic, Partner, PartnerKind,
 };
-use crate::constraints::records::kept::Kept;
+use crate::constraints::records::kept::SolverState;
 use crate::constraints::records::point_vector::places;
 use crate::lanes::{Block, BodyRow, Lanes, RowStore};
 
@@ -77,13 +77,13 @@ pub(crate) struct StickySweep<'a> {
     pub drifts: [&'a mut [Block]; 2],
 }
 
-/// Copies drifts from [`Kept`] into lane order.
+/// Copies drifts from [`SolverState`] into lane order.
 pub(crate) struct LoadDrift<'a> {
     /// As in [`StickySweep`].
     pub drifts: [&'a mut [Block]; 2],
 }
 
-/// Stores the drifts at the end of the step in [`Kept`]; see the [module](self).
+/// Stores the drifts at the end of the step in [`SolverState`]; see the [module](self).
 pub(crate) struct BookDrift<'a> {
     /// As in [`Sticky`].
     pub reach: f32,
@@ -116,11 +116,11 @@ impl Pass for BookDrift<'_> {
 }
 
 #[inline(never)]
-fn load<L: Lanes>(batches: &mut Batches, kept: &mut Kept, drifts: &mut [Block], layout: LayoutOf) {
+fn load<L: Lanes>(batches: &mut Batches, kept: &mut SolverState, drifts: &mut [Block], layout: LayoutOf) {
     let (kept, drifts): (_, &mut [L]) = (kept.by_point(), bytemuck::cast_slice_mut(drifts));
     for i in 0..batches.segments().len() {
         let segment = batches.segments()[i];
-        let layout = layout(segment.opposite);
+        let layout = layout(segment.partner);
         let SegmentRecords { contact, .. } = batches.records_of::<L>(&segment, &layout);
         for (batch, contact) in contact.batches().enumerate() {
             for (p, kept) in kept.iter().enumerate().take(layout.points) {
@@ -146,7 +146,7 @@ fn flag_at<L: Lanes>(segment: &Segment, batch: usize, p: usize) -> usize {
 
 /// Separations and drifts within the step of a batch's points.
 #[inline(always)]
-fn motion<L: Lanes, N: KernelFeatures, O: Opposite>(
+fn motion<L: Lanes, N: KernelFeatures, O: Partner>(
     record: &[L],
     layout: &Layout,
     a: &[L; 8],
@@ -168,7 +168,7 @@ fn motion<L: Lanes, N: KernelFeatures, O: Opposite>(
 }
 
 #[inline(always)]
-fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
+fn sweep<L: Lanes, N: KernelFeatures, O: Partner>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,
@@ -267,11 +267,11 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Opposite>(
 }
 
 #[inline(always)]
-fn book<L: Lanes, N: KernelFeatures, O: Opposite>(
+fn book<L: Lanes, N: KernelFeatures, O: Partner>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,
-    kept: &mut Kept,
+    kept: &mut SolverState,
     drifts: &[Block],
     reach: f32,
 ) {

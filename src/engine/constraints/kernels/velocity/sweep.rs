@@ -40,7 +40,7 @@ use crate::constraints::kernels::velocity::rules::Softness;
 use crate::constraints::numerics::cone;
 use crate::constraints::records::batches::{Batches, Segment};
 use crate::constraints::records::features::{
-    KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
+    KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
 use crate::lanes::{BodyRow, Lanes, RowStore};
 
@@ -188,7 +188,7 @@ impl<L: Lanes> Rows<L> {
     /// Updates row `q` for the impulse `delta` at a row with arms `from`. `direct` is the part of k that does
     /// not involve rotation.
     #[inline(always)]
-    pub(crate) fn propagate_delta<N: KernelFeatures, O: Opposite>(
+    pub(crate) fn propagate_delta<N: KernelFeatures, O: Partner>(
         &mut self,
         q: usize,
         direct: L,
@@ -224,7 +224,7 @@ impl<L: Lanes> Rows<L> {
 
     /// Solves the friction rows one after the other, bounded by `normal` impulses.
     #[inline(always)]
-    pub(crate) fn solve_friction<N: KernelFeatures, O: Opposite>(
+    pub(crate) fn solve_friction<N: KernelFeatures, O: Partner>(
         &mut self,
         rule: impl NormalRule,
         record: &mut [L],
@@ -281,14 +281,14 @@ struct PartialPoints<L> {
 impl<L: Lanes> PartialPoints<L> {
     /// Arms of bodies a and b at point `p` along n and along t, turned if the rule requires it.
     #[inline(always)]
-    fn arms<N: KernelFeatures, O: Opposite, R: NormalRule>(&self, record: &[L], p: usize) -> [[L; 2]; 2] {
+    fn arms<N: KernelFeatures, O: Partner, R: NormalRule>(&self, record: &[L], p: usize) -> [[L; 2]; 2] {
         let layout = const { Layout::of::<N, O>() };
         let (arm_n, arm_t) = (arms::<L, N, O>(record, &layout, p, 0), arms::<L, N, O>(record, &layout, p, 1));
         if R::TURNED { turned(arm_n, arm_t, self.turn[0], self.turn[1]) } else { [arm_n, arm_t] }
     }
 }
 
-impl<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule> Stages<L, N, O> for RowByRow<R> {
+impl<L: Lanes, N: KernelFeatures, O: Partner, R: NormalRule> Stages<L, N, O> for RowByRow<R> {
     type Partial = PartialPoints<L>;
 
     #[inline(always)]
@@ -375,7 +375,7 @@ impl<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule> Stages<L, N, O> fo
 
 /// One sweep over a segment.
 #[inline(always)]
-pub(crate) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Opposite, R: NormalRule, S: RowStore + ?Sized>(
+pub(crate) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Partner, R: NormalRule, S: RowStore + ?Sized>(
     rows: &mut S,
     batches: &mut Batches,
     segment: &Segment,

@@ -5,7 +5,7 @@ use crate::constraints::kernels::pass::{Pass, PassInput};
 use crate::constraints::kernels::stages::{for_each_batch, over_segments};
 use crate::constraints::records::batches::{Batches, Segment};
 use crate::constraints::records::features::{
-    KernelFeatures, Layout, OnMoving, OnStatic, Opposite, OppositeKind,
+    KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
 use crate::lanes::{BodyRow, Lanes};
 
@@ -42,7 +42,7 @@ fn warm_start_with<L: Lanes, N: KernelFeatures, const TURNED: bool>(
 
 /// Applies the accumulated impulses of a segment.
 #[inline(always)]
-fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Opposite, const TURNED: bool>(
+fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Partner, const TURNED: bool>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,

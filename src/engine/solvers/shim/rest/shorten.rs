@@ -67,7 +67,7 @@ use super::closed::{CALM_TIME, NEARLY};
 use crate::constraints::kernels::pass::{Pass, PassInput};
 use crate::constraints::kernels::velocity::rules::{Soft, Softness};
 use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
-use crate::constraints::records::features::{KernelFeatures, Layout, OppositeKind};
+use crate::constraints::records::features::{KernelFeatures, Layout, PartnerKind};
 use crate::lanes::{LaneIndex, Lanes, Quad, prefetch_quad};
 
 /// See the [module](self).
@@ -110,8 +110,8 @@ fn shorten<L: Lanes>(
     kept: &mut [f32],
     &ApplyPreload { springs, h, dt, rises, once }: &ApplyPreload,
 ) {
-    let Softness { bias_rate, mass_scale, impulse_scale } = match segment.opposite {
-        OppositeKind::Dynamic => springs.dynamic,
+    let Softness { bias_rate, mass_scale, impulse_scale } = match segment.partner {
+        PartnerKind::Dynamic => springs.dynamic,
         _ => springs.against_static,
     };
     // Sag per load and effective mass (s²).
