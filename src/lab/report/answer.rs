@@ -154,7 +154,7 @@ fn warnings(records: &[Record], steps: Option<u32>) -> String {
     if waited > BUSY {
         text += &format!(
             "WARNING: this machine was busy: the timed thread waited for a processor {:.0} % of the time. That is taken \
-             out of the times, and differences up to it are shown as ties. Run again on an idle machine.\n",
+             out of the times. Fewer blocks remain to compare, so more differences are ties. Run again on an idle machine.\n",
             100.0 * waited
         );
     }
