@@ -89,7 +89,7 @@ impl Partner for OnStatic {
     const HAS_ROW: bool = false;
 }
 
-/// [`Opposite`] as a value.
+/// [`Partner`] as a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PartnerKind {
     /// A dynamic body: impulses change its velocity.
