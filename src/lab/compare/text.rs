@@ -41,8 +41,8 @@ pub fn text(found: &Comparison, all: bool) -> String {
         n.machine,
         100.0 * n.waited
     );
-    if found.busy {
-        text += "other programs ran, which slow all settings of a scene alike: times are relative to the median of their scene\n";
+    if found.relative_to_scenes {
+        text += "other programs slow all settings of a scene alike, as a change of the scene would: times are relative to the median of their scene\n";
     }
     text += "\n";
     // All widths of a setting end in the same bits, so one of them is enough.
