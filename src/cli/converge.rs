@@ -135,14 +135,16 @@ pub fn run(args: &ConvergeArgs) -> Result<ExitCode, Error> {
         return freeze(args, file);
     }
     let standard = SettingArgs::standard()?;
-    let before = SettingArgs { set: Vec::new(), ..args.setting.clone() }.settings()?;
+    let mut before = args.setting.clone();
+    let set = std::mem::take(&mut before.work.set);
+    let before = before.settings()?;
     if format!("{before:?}") != format!("{:?}", standard.settings()?) {
         let message = "the setting of the steps before; give --freeze FILE, then converge FILE";
         return Err(Error::invalid("--solver, --substeps, --…-iterations, --impacts, --without", message));
     }
-    let (solvers, set) = (args.solvers.chosen(), &args.setting.set);
-    overrides::check(&solvers, set)?;
-    note(&overrides::partly(&solvers, set));
+    let solvers = args.solvers.chosen();
+    overrides::check(&solvers, &set)?;
+    note(&overrides::partly(&solvers, &set));
     let frozen = if is_frozen {
         Frozen::read(&path)?
     } else {
@@ -157,7 +159,7 @@ pub fn run(args: &ConvergeArgs) -> Result<ExitCode, Error> {
         max_iterations: args.max_iterations,
         seed: args.seed,
         width: args.lanes.or_native(),
-        overrides: set.clone(),
+        overrides: set,
         rounds: args.repeats,
         baseline: true,
     };

@@ -2,21 +2,21 @@
 
 use super::output::{note, print, print_json, value};
 use super::progress::Bar;
-use super::values::{FrozenArgs, SettingArgs};
+use super::values::{BudgetArgs, FrozenArgs, SettingArgs};
 use super::verify::VerifyArgs;
 use crate::engine::solvers::{DEFAULT, Variant, find};
 use crate::engine::world::Settings;
 use crate::lab::error::Error;
 use crate::lab::files;
-use crate::lab::overrides::{self, Override};
+use crate::lab::overrides;
 use crate::lab::report::environment::Environment;
 use crate::lab::study::budget;
 use crate::lab::torture::families::{FAMILIES, Family};
 use crate::lab::torture::minimize::minimize;
 use crate::lab::torture::table::{lines, text};
 use crate::lab::torture::{Campaign, TortureRow, family, pace, run_solver};
-use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{ArgGroup, Args};
 use serde_json::json;
 use std::collections::HashSet;
 use std::fs::{File, OpenOptions, read_to_string};
@@ -55,72 +55,69 @@ impl FromStr for RandomScenes {
     }
 }
 
+/// The group of all options that need `--random`: without it, nothing would come of them.
+pub const OPTIONS: &str = "random_options";
+
+const NEED_RANDOM: [&str; 13] = [
+    "seed",
+    "families",
+    "continuous",
+    "substeps",
+    "velocity_iterations",
+    "relax_iterations",
+    "position_iterations",
+    "set",
+    "frozen",
+    "keep",
+    "log",
+    "pace",
+    "allow",
+];
+
 /// Options of random scenes.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Random scenes")]
+#[command(group = ArgGroup::new(OPTIONS).args(NEED_RANDOM).multiple(true).requires("random"))]
 pub struct RandomArgs {
-    /// Random scenes instead of the cases: their number over all families, or one scene as FAMILY:NUMBER
+    /// Random scenes instead of the cases: their number over all families, or one scene as FAMILY:NUMBER. Scenes that
+    /// set their own substeps keep them
     #[arg(long, value_name = "N", conflicts_with_all = ["cases", "list"])]
     pub random: Option<RandomScenes>,
     /// Random seed of all scenes
-    #[arg(long, default_value_t = 1, requires = "random")]
+    #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Families of scenes [default: all]
-    #[arg(long, value_delimiter = ',', value_name = "FAMILY,…", value_parser = family_value(), requires = "random")]
+    #[arg(long, value_delimiter = ',', value_name = "FAMILY,…", value_parser = family_value())]
     pub families: Vec<&'static Family>,
     /// Continuous collision: stop fast bodies at the surfaces that they would pass through [default: the solver's]
-    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true", requires = "random")]
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pub continuous: Option<bool>,
-    /// Substeps; scenes that set their own keep it [default: the solver's]
-    #[arg(long, value_name = "N", requires = "random")]
-    pub substeps: Option<u32>,
-    /// Velocity sweeps per substep [default: the solver's]
-    #[arg(long, value_name = "N", requires = "random")]
-    pub velocity_iterations: Option<u32>,
-    /// Relaxation sweeps per substep [default: the solver's]
-    #[arg(long, value_name = "N", requires = "random")]
-    pub relax_iterations: Option<u32>,
-    /// Position sweeps per substep [default: the solver's]
-    #[arg(long, value_name = "N", requires = "random")]
-    pub position_iterations: Option<u32>,
-    /// Solver parameters, such as `contact_hertz=60`
-    #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',', requires = "random")]
-    pub set: Vec<Override>,
+    /// Budget and parameters
+    #[command(flatten)]
+    pub work: BudgetArgs,
     /// Frozen contacts
     #[command(flatten)]
     pub frozen: FrozenArgs,
     /// Write every scene that fails, minimized, into this folder
-    #[arg(long, value_name = "DIR", requires = "random")]
+    #[arg(long, value_name = "DIR")]
     pub keep: Option<PathBuf>,
     /// Write one line of JSON per scene and solver; scenes already in the file are not run again
-    #[arg(long, value_name = "FILE", requires = "random")]
+    #[arg(long, value_name = "FILE")]
     pub log: Option<PathBuf>,
     /// Also time the steps of each scene, N times: the longest step ÷ the median at the same number of
     /// contacts
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100), requires = "random")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100))]
     pub pace: Option<u32>,
     /// Exit with code 1 if a solver fails more scenes than this
-    #[arg(long, value_name = "N", requires = "random")]
+    #[arg(long, value_name = "N")]
     pub allow: Option<u32>,
 }
 
 impl VerifyArgs {
     fn settings(&self, solver: &'static Variant) -> Result<Settings, Error> {
-        let RandomArgs { substeps, velocity_iterations, relax_iterations, position_iterations, .. } =
-            self.random;
-        let (set, frozen) = (self.random.set.clone(), self.random.frozen);
+        let RandomArgs { work, frozen, .. } = self.random.clone();
         let (impacts, without) = (self.impacts, self.without.clone());
-        let own = SettingArgs {
-            solver,
-            substeps,
-            velocity_iterations,
-            relax_iterations,
-            position_iterations,
-            set,
-            impacts,
-            frozen,
-            without,
-        };
+        let own = SettingArgs { solver, work, impacts, frozen, without };
         let own = own.settings()?;
         Ok(Settings { continuous: self.random.continuous.unwrap_or(own.continuous), ..own })
     }

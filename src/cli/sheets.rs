@@ -41,21 +41,29 @@ impl Sheets {
     /// Observes the world at its start and after every step, and writes what is due. Errors: a file cannot be
     /// written.
     pub fn add(&mut self, world: &World, scene: &Scene) -> Result<(), Error> {
-        let new = || Angles::new(world, scene.bodies.iter().map(|b| b.angle));
-        let step = world.step_index;
-        let angles = self.angles.get_or_insert_with(new);
-        if step > 0 {
-            angles.add(world);
-            let last = u64::from(scene.steps);
-            if self.every.map_or(step == last, |every| step.is_multiple_of(u64::from(every))) {
-                self.state.as_mut().map_or(Ok(()), |sheet| write_state(sheet, world, angles, scene.dt))?;
-                self.contacts.as_mut().map_or(Ok(()), |sheet| write_contacts(sheet, world, &self.starts))?;
-                self.joints.as_mut().map_or(Ok(()), |sheet| write_joints(sheet, world))?;
+        let (step, last) = (world.step_index, u64::from(scene.steps));
+        let due = |step: u64| self.every.map_or(step == last, |every| step.is_multiple_of(u64::from(every)));
+        if let Some(sheet) = &mut self.state {
+            let new = || Angles::new(world, scene.bodies.iter().map(|b| b.angle));
+            let angles = self.angles.get_or_insert_with(new);
+            if step > 0 {
+                angles.add(world);
+            }
+            if step > 0 && due(step) {
+                write_state(sheet, world, angles, scene.dt)?;
             }
         }
-        if self.contacts.is_some() {
-            self.starts.clear();
-            self.starts.extend((0..world.bodies.len()).map(|i| world.bodies.pose(i).position));
+        if let Some(sheet) = &mut self.contacts {
+            if step > 0 && due(step) {
+                write_contacts(sheet, world, &self.starts)?;
+            }
+            if due(step + 1) {
+                self.starts.clear();
+                self.starts.extend((0..world.bodies.len()).map(|i| world.bodies.pose(i).position));
+            }
+        }
+        if let Some(sheet) = self.joints.as_mut().filter(|_| step > 0 && due(step)) {
+            write_joints(sheet, world)?;
         }
         Ok(())
     }

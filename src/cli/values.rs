@@ -209,12 +209,9 @@ pub fn widths(given: &[LaneWidth], own: Vec<LaneWidth>) -> Vec<LaneWidth> {
     widths
 }
 
-/// The solver, its budget and its parameters, for commands that run one setting.
-#[derive(Args, Clone, Debug)]
-pub struct SettingArgs {
-    /// Solver
-    #[arg(long, default_value = DEFAULT, value_name = "SOLVER", value_parser = solver())]
-    pub solver: &'static Variant,
+/// The budget and the parameters of a setting.
+#[derive(Args, Clone, Debug, Default)]
+pub struct BudgetArgs {
     /// Substeps [default: the solver's]
     #[arg(long, value_name = "N")]
     pub substeps: Option<u32>,
@@ -230,6 +227,17 @@ pub struct SettingArgs {
     /// Solver parameters, such as `contact_hertz=60` (`simpulse list solvers` lists them)
     #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
     pub set: Vec<Override>,
+}
+
+/// The solver, its budget and its parameters, for commands that run one setting.
+#[derive(Args, Clone, Debug)]
+pub struct SettingArgs {
+    /// Solver
+    #[arg(long, default_value = DEFAULT, value_name = "SOLVER", value_parser = solver())]
+    pub solver: &'static Variant,
+    /// Budget and parameters
+    #[command(flatten)]
+    pub work: BudgetArgs,
     /// Impacts
     #[command(flatten)]
     pub impacts: ImpactArgs,
@@ -244,22 +252,17 @@ pub struct SettingArgs {
 impl SettingArgs {
     /// The default solver at its standard setting.
     pub fn standard() -> Result<Self, Error> {
-        let (none, solver) = (None, find(DEFAULT)?);
         Ok(SettingArgs {
-            solver,
-            substeps: none,
-            velocity_iterations: none,
-            relax_iterations: none,
-            position_iterations: none,
-            set: Vec::new(),
+            solver: find(DEFAULT)?,
+            work: BudgetArgs::default(),
             impacts: ImpactArgs::default(),
             frozen: FrozenArgs::default(),
             without: WithoutArgs::default(),
         })
     }
 
-    /// The solver with its budget, parameters, mechanisms and treatments of impacts and frozen contacts. Errors: as [`Self::budget`] and
-    /// [`Self::parameters`].
+    /// The solver with its budget, parameters, mechanisms and treatments of impacts and frozen contacts.
+    /// Errors: as [`Self::budget`] and [`Self::parameters`].
     pub fn settings(&self) -> Result<Settings, Error> {
         let (budget, parameters) = (self.budget()?, self.parameters()?);
         let (impacts, without) = (self.impacts.impacts, self.without.of(self.solver)?);
@@ -269,20 +272,20 @@ impl SettingArgs {
 
     /// The budget. Errors: one that the solver cannot run with; sweeps of a kind that it does not have.
     pub fn budget(&self) -> Result<Budget, Error> {
-        let own = self.solver.budget;
+        let (own, work) = (self.solver.budget, &self.work);
         let given = [
-            ("velocity-iterations", self.velocity_iterations),
-            ("relax-iterations", self.relax_iterations),
-            ("position-iterations", self.position_iterations),
+            ("velocity-iterations", work.velocity_iterations),
+            ("relax-iterations", work.relax_iterations),
+            ("position-iterations", work.position_iterations),
         ];
         for (option, _) in given.iter().filter(|(_, count)| count.is_some()) {
             budget::check_used(option, &[self.solver])?;
         }
         let chosen = Budget {
-            substeps: self.substeps.unwrap_or(own.substeps),
-            velocity_iterations: self.velocity_iterations.unwrap_or(own.velocity_iterations),
-            relax_iterations: self.relax_iterations.unwrap_or(own.relax_iterations),
-            position_iterations: self.position_iterations.unwrap_or(own.position_iterations),
+            substeps: work.substeps.unwrap_or(own.substeps),
+            velocity_iterations: work.velocity_iterations.unwrap_or(own.velocity_iterations),
+            relax_iterations: work.relax_iterations.unwrap_or(own.relax_iterations),
+            position_iterations: work.position_iterations.unwrap_or(own.position_iterations),
         };
         budget::check(&chosen, self.solver)?;
         Ok(chosen)
@@ -290,8 +293,8 @@ impl SettingArgs {
 
     /// The solver's parameters. Errors: a parameter that it does not have, a value out of its range.
     pub fn parameters(&self) -> Result<Parameters, Error> {
-        overrides::check(&[self.solver], &self.set)?;
-        overrides::values(self.solver, &self.set)
+        overrides::check(&[self.solver], &self.work.set)?;
+        overrides::values(self.solver, &self.work.set)
     }
 }
 

@@ -48,7 +48,7 @@ Examples:
   simpulse verify --random driven:17 --keep failed/        one scene again, and its minimized file")]
 pub struct VerifyArgs {
     /// Cases (B4.heavy) or families of cases (B4) [default: all]
-    #[arg(long, value_delimiter = ',', value_name = "ID,…", value_parser = NonEmptyStringValueParser::new())]
+    #[arg(long, value_delimiter = ',', value_name = "ID,…", value_parser = NonEmptyStringValueParser::new(), conflicts_with = random::OPTIONS)]
     pub cases: Vec<String>,
     /// Solvers
     #[command(flatten)]
@@ -63,7 +63,7 @@ pub struct VerifyArgs {
     #[arg(long)]
     pub json: bool,
     /// List the cases with their tolerances and what is required of the default solver, without running them
-    #[arg(long)]
+    #[arg(long, conflicts_with = random::OPTIONS)]
     pub list: bool,
     /// Threads; the results do not depend on them [default: 2; all cores for random scenes, 1 with --pace]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]

@@ -28,7 +28,7 @@ use crate::lab::study::curve::ErrorAxis;
 use crate::lab::study::sample::{Sample, median};
 use serde::Serialize;
 use solvers::SolverChange;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Errors below this fraction of their tolerance count as zero (1).
 pub const NEGLIGIBLE: f64 = 0.01;
@@ -290,8 +290,7 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &CompareOptions) 
     }
     let solvers = solvers::changes(&pairs);
     let busy = [before, after].into_iter().any(|study| mean(study, |s| s.waited) > BUSY);
-    let mut scenes: Vec<&str> = pairs.iter().map(|p| p.scene.as_str()).collect();
-    scenes.dedup();
+    let scenes: BTreeSet<&str> = pairs.iter().map(|p| p.scene.as_str()).collect();
     let relative_to_scenes = busy || scenes.len() >= FEWEST;
     let common = median_ratio(&pairs);
     if relative_to_scenes {
@@ -304,7 +303,7 @@ pub fn compare(before: &StudyFile, after: &StudyFile, options: &CompareOptions) 
         let [slower, faster] = noise.allowed;
         time.interval = [low * (-slower).exp(), high * faster.exp()];
     }
-    let common = if relative_to_scenes { common } else { median_ratio(&pairs) };
+    let common = common.map(|ratio| ratio / noise.machine);
     if let (true, false, Some(common)) = (options.relative, relative_to_scenes, common) {
         for time in pairs.iter_mut().filter_map(|p| p.time.as_mut()) {
             time.ratio /= common;
@@ -362,7 +361,7 @@ fn noise(before: &StudyFile, after: &StudyFile, pairs: &[SettingPair]) -> Noise 
 }
 
 fn key(r: &Record) -> impl PartialEq {
-    (&r.scene, r.setting(), r.lanes)
+    (r.setting(), r.lanes)
 }
 
 fn pair(one: &Record, other: &Record) -> SettingPair {

@@ -254,8 +254,9 @@ impl Record {
         self.excess_at(1.0)
     }
 
-    /// The largest error ÷ this multiple of its tolerance: all are within up to 1. Infinite for a run that does not hold, that never reached the event of the reference value, or that fallback sweeps solved
-    /// instead of the solver's own method.
+    /// The largest error ÷ this multiple of its tolerance: all are within up to 1. Infinite for a run that does
+    /// not hold, that never reached the event of the reference value, or that fallback sweeps solved instead of
+    /// the solver's own method.
     pub fn excess_at(&self, share: f64) -> f64 {
         let known = |axis: &ErrorAxis| match axis {
             ErrorAxis::Truth => self.truth.is_some() && self.tolerances.truth.is_some(),

@@ -17,8 +17,9 @@
 //! one loss. Unbeaten candidates are never dropped: before the first contact, short runs show no difference.
 //! Of the last candidates, a study times those with the least work at each of the [`LEVELS`] of the
 //! tolerances. Each of these must stand for a minute if the scene should come to rest. If they are fewer than
-//! three, the next plausible ones are added. If none of the last candidates is plausible, the dropped ones get whole runs as
-//! well, until one is. So no solver fails on a scene because of candidates that only had short runs.
+//! three, the next plausible ones are added. If none of the last candidates is plausible, the dropped ones get
+//! whole runs as well, until one is. So no solver fails on a scene because of candidates that only had short
+//! runs.
 
 use super::found::{FoundBudgets, TunedBudget};
 use super::horizon::{in_parallel, later};
@@ -85,11 +86,21 @@ pub fn search(
     name: &str,
     tell: &(dyn Fn(f64, String) + Sync),
 ) -> Result<Vec<FoundBudgets>, Error> {
-    let Loaded { scene, demands, .. } = plan.open(name)?;
+    let loaded = plan.open(name)?;
+    let rests = loaded.rests();
+    let Loaded { scene, demands, .. } = loaded;
     let solvers = plan.solvers.iter().filter(|solver| scene.runs_on(solver).is_ok());
     let jobs: Vec<SearchJob> = solvers
         .flat_map(|&solver| plan.impacts_on(&scene).iter().map(move |&impacts| (solver, impacts)))
-        .map(|(solver, impacts)| SearchJob { plan, name, scene: &scene, demands: &demands, solver, impacts })
+        .map(|(solver, impacts)| SearchJob {
+            plan,
+            name,
+            scene: &scene,
+            demands: &demands,
+            rests,
+            solver,
+            impacts,
+        })
         .collect();
     let (done, total) = (AtomicUsize::new(0), jobs.len() as f64);
     in_parallel(&jobs, |job| {
@@ -178,6 +189,8 @@ struct SearchJob<'a> {
     name: &'a str,
     scene: &'a Scene,
     demands: &'a [Demand],
+    /// Whether the scene must come to rest.
+    rests: bool,
     solver: &'static Variant,
     impacts: Impacts,
 }
@@ -205,7 +218,6 @@ impl SearchJob<'_> {
     /// The settings to time, the least work first.
     fn best(&self) -> Result<Vec<TunedBudget>, Error> {
         let mut left = candidates(self.solver, self.scene.dt);
-        let rests = self.demands.iter().any(|d| matches!(d, Demand::Rests));
         let mut dropped = Vec::new();
         for part in PARTS {
             let trials = self.judged(&left, Some((self.scene.steps / part).max(1)))?;
@@ -221,7 +233,7 @@ impl SearchJob<'_> {
         let mut dropped = dropped.into_iter();
         loop {
             let chosen = choose(&trials);
-            let unknown = chosen.iter().copied().find(|&i| rests && trials[i].record.later.is_none());
+            let unknown = chosen.iter().copied().find(|&i| self.rests && trials[i].record.later.is_none());
             let none = !chosen.iter().any(|&i| trials[i].is_plausible());
             if let Some(i) = unknown {
                 let (order, width) = self.order();
@@ -270,8 +282,8 @@ impl SearchJob<'_> {
             works.push(work);
         }
         let is_last = plan.only_given && steps == self.plan.steps;
-        if steps.is_some() && !is_last {
-            leave_out_unseen(&mut records, steps.unwrap_or(self.scene.steps));
+        if let Some(steps) = steps.filter(|_| !is_last) {
+            leave_out_unseen(&mut records, steps);
         }
         let trials = list.iter().zip(records).zip(works);
         Ok(trials.map(|((&candidate, record), work)| SearchTrial { candidate, record, work }).collect())

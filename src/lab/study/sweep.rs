@@ -1,8 +1,9 @@
 //! A sweep: one quantity takes several values, and everything else stays the same.
 //!
-//! The quantity belongs to solvers (a parameter), to the budget, to the scene, or to the kernels (their features). Solvers without the
-//! quantity are left out. If the step length changes, runs keep their duration. If friction changes, the
-//! scene has no reference value, because those of the catalog hold for the scene's own friction.
+//! The quantity belongs to solvers (a parameter), to the budget, to the scene, or to the kernels (their
+//! features). Solvers without the quantity are left out. If the step length changes, runs keep their duration.
+//! If friction changes, the scene has no reference value, because those of the catalog hold for the scene's own
+//! friction.
 
 use super::budget::{self, BudgetGrid};
 use super::curve::distinct;
