@@ -211,7 +211,7 @@ pub fn frozen_table(records: &[Record]) -> Option<DocTable> {
 /// Such a table; a line per solver and value. Scenes on which a solver ran with one value only are left out.
 fn treatments(name: &str, records: &[Record], of: impl Fn(&Record) -> String) -> Option<DocTable> {
     let caption = format!(
-        "What {name} gain and cost: numbers of scenes on which a setting of the solver holds, is plausible and tight; time \
+        "What {name} gain and cost: numbers of scenes on which a setting of the solver holds in its run, is plausible and tight; time \
          of its cheapest plausible setting over that of its first line, geometric mean; scenes that are better (+) or \
          worse (−) than in its first line"
     );
