@@ -4,20 +4,20 @@
 //! Valgrind does not support AVX-512, so the build must not use it. It has a target folder of its own:
 //!
 //! ```sh
-//! RUSTFLAGS="-C target-cpu=x86-64-v3" cargo bench --features instructions --bench instructions \
-//!     --target-dir target/instructions
+//! RUSTFLAGS="-C target-cpu=x86-64-v3" cargo bench --bench instructions --target-dir target/instructions
 //! ```
 //!
 //! An argument selects the ids that contain it. Each id runs in its own process under valgrind, in which only
 //! `measured` is counted. Instructions are not time: where a sweep waits for memory or for its own results,
 //! fewer instructions need not be faster.
 
-mod common;
-
 use simpulse::engine::constraints::kernels::velocity::rules::{Rigid, Soft};
 use simpulse::engine::constraints::kernels::velocity::sweep::sweep;
 use simpulse::engine::constraints::{Kernel, NormalRule, Workspace};
 use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::solvers;
+use simpulse::engine::world::{Settings, World};
+use simpulse::lab::scenes;
 use std::path::Path;
 use std::process::{Command, ExitCode};
 use wide::{f32x4, f32x8};
@@ -46,7 +46,7 @@ fn one(id: &str) -> ExitCode {
     let parts: Vec<&str> = id.split('/').collect();
     let [_, what, _, lanes, _] = parts[..] else { return ExitCode::from(2) };
     let Some(width) = lanes.parse().ok().and_then(LaneWidth::from_lanes) else { return ExitCode::from(2) };
-    let mut world = common::settled(SCENE, "soft_step", width);
+    let mut world = settled(width);
     let h = 1.0 / 240.0;
     match what {
         "soft" => sweep_once(world.workspace(), Soft::new([188.5, 377.0], 10.0, 3.0, h)),
@@ -54,6 +54,15 @@ fn one(id: &str) -> ExitCode {
         _ => measured(&mut || world.step().expect("a stable scene")),
     }
     ExitCode::SUCCESS
+}
+
+/// The scene after 30 steps of `soft_step`.
+fn settled(width: LaneWidth) -> World {
+    let solver = solvers::find("soft_step").expect("a solver of the table");
+    let scene = scenes::load(SCENE).expect("a scene of the catalog").scene;
+    let mut world = scene.build(Settings::new(solver).exactly(width)).expect("a valid scene");
+    (0..30).for_each(|_| world.step().expect("a stable scene"));
+    world
 }
 
 fn sweep_once<R: NormalRule>(work: &mut Workspace, rule: R) {
@@ -67,7 +76,7 @@ fn sweep_once<R: NormalRule>(work: &mut Workspace, rule: R) {
 }
 
 fn all(filter: &str) -> ExitCode {
-    let contacts = common::settled(SCENE, "soft_step", LaneWidth::W8).counts.contacts as f64;
+    let contacts = settled(LaneWidth::W8).counts.contacts as f64;
     println!("{:<40}{:>14}{:>14}", "id", "instructions", "per contact");
     for what in ["soft", "relax", "step"] {
         for width in WIDTHS {

@@ -102,20 +102,6 @@ fn damping_is_implicit() {
 }
 
 #[test]
-fn forces_and_torques_accelerate() {
-    let mut settings = Settings::new(find("pgs").unwrap());
-    settings.gravity = [0.0; 2];
-    let def = body(BodyKind::Dynamic, [0.0; 2]);
-    let mut world = world(settings, &def);
-    // Mass 2·1·0.5 = 1 kg, inertia m (1² + 0.5²)/12.
-    world.bodies.force_x[0] = 6.0;
-    world.bodies.torque[0] = 1.25 / 12.0;
-    (0..60).for_each(|_| world.step().unwrap());
-    assert!((world.bodies.velocity_x[0] - 6.0).abs() < 1e-4);
-    assert!((world.bodies.angular_velocity[0] - 1.0).abs() < 1e-4);
-}
-
-#[test]
 fn static_bodies_stay_and_kinematic_bodies_follow_their_velocity() {
     let mut world = World::new(Settings::new(find("soft_step").unwrap()));
     let mut fixed = body(BodyKind::Static, [0.1, 0.2]);

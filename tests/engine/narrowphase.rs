@@ -132,22 +132,6 @@ fn circle_on_segment_from_both_sides() {
 }
 
 #[test]
-fn octagon_on_octagon() {
-    // Apothem 1, faces at multiples of 45°; side 2 tan 22.5°.
-    let r = (std::f32::consts::PI / 8.0).cos().recip();
-    let corners: Vec<Vec2> =
-        (0..8).map(|i| r * Vec2::from_angle((i as f32 + 0.5) * std::f32::consts::FRAC_PI_4)).collect();
-    let octagon = Shape::polygon("octagon", &corners, 0.0).expect("valid");
-    let c = std::f32::consts::FRAC_1_SQRT_2;
-    let m = collide(&octagon, &at(0.0, 0.0), &octagon, &at(1.99 * c, 1.99 * c), 0.02);
-    assert_eq!(m.count, 2);
-    assert!((m.normal - v(c, c)).length() < 1e-6);
-    assert!((separation(&m) + 0.01).abs() < 1e-6);
-    let side = (m.points[0].anchor_a - m.points[1].anchor_a).length();
-    assert!((side - 2.0 * (std::f32::consts::PI / 8.0).tan()).abs() < 1e-5);
-}
-
-#[test]
 fn rounded_corners_meet_along_the_line_between_them() {
     let rounded = Shape::rectangle("r", v(0.5, 0.5), Vec2::ZERO, 0.0, 0.25).expect("valid");
     // Corners (0.5, 0.5) and (0.8, 0.9): distance 0.5 = both radii.

@@ -7,7 +7,7 @@ use simpulse::engine::constraints::ImpactLaw;
 use simpulse::engine::constraints::impacts::restitution::{self, ReadApproach, Rebound};
 use simpulse::engine::constraints::kernels::position::position_sweep;
 use simpulse::engine::constraints::kernels::velocity::rules::Rigid;
-use simpulse::engine::constraints::kernels::velocity::sweep::{self, sweep, sweep_store};
+use simpulse::engine::constraints::kernels::velocity::sweep::{self, sweep};
 use simpulse::engine::constraints::kernels::velocity::warm_start::warm_start;
 use simpulse::engine::constraints::records::bounces::Bounces;
 use simpulse::engine::constraints::{
@@ -16,8 +16,8 @@ use simpulse::engine::constraints::{
 };
 use simpulse::engine::contacts::{Contact, quad};
 use simpulse::engine::lanes::{
-    BodyRow, IndexList, Indices, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowColumns, RowStore,
-    prefetch, prefetch_records,
+    BodyRow, IndexList, Indices, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowStore, prefetch,
+    prefetch_records,
 };
 use simpulse::engine::narrowphase::Margins;
 use simpulse::engine::narrowphase::batch::{Input, Jobs, NO_CONTACT, PairKind, Shapes, update};
@@ -127,13 +127,10 @@ enum Reads {
 type Pass = (&'static str, Reads, fn(&mut Given));
 
 /// Every pass over constraints.
-fn passes<L: Lanes>() -> [Pass; 9] {
+fn passes<L: Lanes>() -> [Pass; 8] {
     use Reads::{Both, Bounces, Contacts, Rows};
     [
         ("sweep", Rows, |g| sweep::<L, Full, _>(&mut g.rows, &mut g.batches, RULE)),
-        ("sweep_store", Rows, |g| {
-            sweep_store::<L, Full, _, _>(&mut RowColumns::from_rows(&g.rows), &mut g.batches, RULE);
-        }),
         ("warm_start", Rows, |g| warm_start::<L, Full>(&mut g.rows, &mut g.batches)),
         ("position_sweep", Rows, |g| position_sweep::<L, Full>(&mut g.rows, &mut g.batches, POSITION)),
         ("restitution::apply", Rows, |g| {
@@ -294,9 +291,6 @@ fn bad_gathers<L: Lanes>() {
         panics(&words, || L::scatter_velocity(&mut rows, index, [L::zero(); 4]));
         panics(&words, || L::scatter_delta(&mut rows, index, [L::zero(); 4]));
         panics(&words, || RowStore::gather::<L>(rows.as_slice(), index));
-        let mut columns = RowColumns::from_rows(&rows);
-        panics(&words, || columns.gather::<L>(index));
-        panics(&words, || columns.scatter_velocity(index, [L::zero(); 4]));
         let mut values = [0.0; ROWS];
         panics(&words, || L::load_at(&values, index));
         panics(&words, || L::store_at(&mut values, index, L::zero()));
@@ -352,19 +346,6 @@ fn batches_without_a_width_take_no_segment() {
     };
     panics("without lanes", || push(Batches::default()));
     panics("without lanes", || Batches::default().clear(0));
-}
-
-/// Row indices far out of bounds, and no rows at all.
-#[test]
-fn a_sweep_over_no_rows_panics() {
-    let mut batches = Batches::default();
-    batches.clear(8);
-    let kind = PartnerKind::Dynamic;
-    batches.push_segment(kind, &layout(kind), [(0, [1_000_000_000, 999_999_999])].into_iter(), 1_000_000_000);
-    batches.reserve_buffer();
-    panics("index 1000000000 where there are 0 rows", || {
-        sweep::sweep::<f32x8, Full, _>(&mut [], &mut batches, RULE);
-    });
 }
 
 #[test]

@@ -8,34 +8,6 @@ use simpulse::engine::params::HIT_SPEED;
 use simpulse::engine::solvers::{self, VARIANTS};
 use simpulse::engine::world::{ContactEvent, Settings, World};
 
-/// The first program of a user.
-#[test]
-fn the_first_program_runs() -> Result<(), Box<dyn std::error::Error>> {
-    let settings = Settings { contact_events: true, ..Settings::new(solvers::find("shim")?) };
-    let mut world = World::new(settings);
-    world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(20.0, 1.0)?))?;
-    let crate_ = world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
-    world.step()?;
-    world.apply_force(crate_, [500.0, 0.0])?;
-    world.step()?;
-    world.set_pose(crate_, [3.0, 1.0], 0.3)?;
-    let hit = world.ray_cast([3.0, 10.0], [0.0, -1.0])?.ok_or("nothing below")?;
-    assert_eq!(hit.body, crate_);
-    for _ in 0..60 {
-        world.step()?;
-    }
-    for event in world.contact_events() {
-        assert!(!matches!(event, ContactEvent::Hit { .. }), "it has come to rest: {event:?}");
-    }
-    assert_eq!(world.contacts_of(crate_)?.count(), 1);
-    let save = world.clone();
-    world.remove_body(crate_)?;
-    world.step()?;
-    assert_eq!((world.contacts.len(), save.contacts.len()), (0, 1));
-    assert!(format!("{world:?}").contains("shim"));
-    Ok(())
-}
-
 fn ground(world: &mut World) -> BodyHandle {
     world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(30.0, 1.0).unwrap())).unwrap()
 }
@@ -166,13 +138,6 @@ fn every_broad_phase_sees_the_same_edits() {
         };
         let [a, b] = BroadPhaseKind::ALL.map(hash);
         assert!(a == b, "{solver}: {a:x} {b:x}");
-    }
-}
-
-#[test]
-fn no_solver_falls_over_edits() {
-    for variant in VARIANTS {
-        edited(World::new(Settings::new(variant)), |_| {});
     }
 }
 

@@ -2,7 +2,7 @@
 
 #![allow(unsafe_code, reason = "a C library")]
 
-use crate::engine::{Contender, Engine, Stages, State, stages_of};
+use crate::engine::{Contender, Engine, State};
 use boxdd_sys::ffi::*;
 use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::joints::JointKind;
@@ -213,17 +213,6 @@ impl Engine for Box2d {
             ends += buffer.iter().map(|c| c.manifold.pointCount as usize).sum::<usize>();
         }
         ends / 2
-    }
-
-    fn stages(&self) -> Stages {
-        // SAFETY: the world lives as long as `self`.
-        let p = unsafe { b2World_GetProfile(self.world) };
-        // Colors are maintained while colliding.
-        let before = [p.pairs + p.transforms + p.refit, p.collide, p.solverSetup, p.prepareConstraints];
-        let relax = p.relaxImpulses + p.applyRestitution;
-        let integrate = p.integrateVelocities + p.integratePositions;
-        let within = [p.warmStart, p.solveImpulses, relax, integrate];
-        stages_of(before.map(f64::from), within.map(f64::from), p.storeImpulses.into())
     }
 }
 

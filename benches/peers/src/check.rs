@@ -1,15 +1,14 @@
 //! The neutral check: errors computed from body poses in double precision, the same for every engine.
 //!
-//! Poses and velocities are copied into a mirror of the scene that is never stepped. Overlaps come from GJK
-//! and EPA in `f64`, which no engine here uses for its contacts.
+//! Poses and velocities are copied into a mirror of the scene that is never stepped. Pairs are searched there, and
+//! their overlaps come from GJK and EPA in `f64`, which no engine here uses for its contacts.
 
 use crate::engine::Engine;
-use simpulse::engine::broadphase::{BroadPhase, BroadPhaseKind, Proxy};
 use simpulse::engine::narrowphase::{epa::penetration, gjk::distance};
 use simpulse::engine::params::SPECULATIVE_DISTANCE;
-use simpulse::engine::shapes::Shape;
 use simpulse::engine::solvers;
 use simpulse::engine::world::{Settings, World};
+use simpulse::lab::metrics::overlaps::Overlaps;
 use simpulse::lab::metrics::state::BodyState;
 use simpulse::lab::scenes::{Loaded, Truth};
 
@@ -53,8 +52,7 @@ pub struct Checker {
     mirror: World,
     truth: Option<Truth>,
     steps: u64,
-    broadphase: BroadPhase,
-    proxies: Vec<Proxy>,
+    pairs: Overlaps,
     half_extent: f64,
     start: Vec<[f64; 2]>,
     squares: f64,
@@ -71,15 +69,8 @@ impl Checker {
     pub fn new(Loaded { scene, truth, .. }: Loaded) -> Result<Self, String> {
         let settings = Settings::new(solvers::find("soft_step").map_err(|e| e.to_string())?);
         let mirror = scene.build(settings).map_err(|e| e.to_string())?;
-        let shapes = || mirror.shapes.iter().zip(&mirror.shape_body);
-        let proxy = |(shape, &body): (&Shape, &u32)| Proxy {
-            aabb: shape.aabb(&mirror.bodies.pose(body as usize)),
-            body,
-            group: mirror.bodies.group[body as usize],
-            dynamic: mirror.bodies.is_dynamic(body as usize),
-        };
-        let proxies = shapes().map(proxy).collect();
-        let half_extent = shapes()
+        let shapes = mirror.shapes.iter().zip(&mirror.shape_body);
+        let half_extent = shapes
             .filter(|&(_, &body)| mirror.bodies.is_dynamic(body as usize))
             .map(|(shape, _)| f64::from(shape.min_half_extent()))
             .fold(f64::INFINITY, f64::min);
@@ -88,8 +79,7 @@ impl Checker {
             mirror,
             truth,
             steps: u64::from(scene.steps),
-            broadphase: BroadPhase::new(BroadPhaseKind::HashGrid),
-            proxies,
+            pairs: Overlaps::default(),
             half_extent,
             start,
             squares: 0.0,
@@ -142,18 +132,9 @@ impl Checker {
     }
 
     fn add_overlaps(&mut self) {
-        let world = &self.mirror;
-        for ((proxy, shape), &body) in self.proxies.iter_mut().zip(&world.shapes).zip(&world.shape_body) {
-            proxy.aabb = shape.aabb(&world.bodies.pose(body as usize)).grown(SPECULATIVE_DISTANCE);
-        }
-        let mut candidates = Vec::new();
-        self.broadphase.pairs(&self.proxies, &mut candidates);
-        self.errors.pairs = 0;
-        for pair in candidates {
-            let [i, j] = pair.map(|s| world.shape_body[s as usize] as usize);
-            if world.keeps_apart(i, j) {
-                continue;
-            }
+        let Checker { mirror: world, overlaps, errors, half_extent, .. } = self;
+        errors.pairs = 0;
+        self.pairs.find(world, |pair, _| {
             let [(a, pose_a), (b, pose_b)] = pair.map(|s| {
                 let s = s as usize;
                 (&world.shapes[s], world.bodies.pose(world.shape_body[s] as usize))
@@ -163,13 +144,12 @@ impl Checker {
             let separation = cores - f64::from(a.radius()) - f64::from(b.radius());
             if separation < f64::from(SPECULATIVE_DISTANCE) {
                 let depth = (-separation).max(0.0);
-                self.errors.pairs += 1;
-                self.overlaps.0 += depth;
-                self.overlaps.1 += 1;
-                self.overlaps.2 += usize::from(depth > self.half_extent);
-                self.errors.penetration_max = self.errors.penetration_max.max(depth);
+                errors.pairs += 1;
+                *overlaps =
+                    (overlaps.0 + depth, overlaps.1 + 1, overlaps.2 + usize::from(depth > *half_extent));
+                errors.penetration_max = errors.penetration_max.max(depth);
             }
-        }
+        });
     }
 
     /// The errors of the observed steps.

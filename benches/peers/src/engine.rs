@@ -20,13 +20,6 @@ pub trait Engine {
 
     /// Number of contact points that the engine currently solves.
     fn points(&self) -> usize;
-
-    /// Times of the last step, with the clocks on.
-    fn stages(&self) -> Stages;
-
-    /// Turns the clocks inside the step on or off, where that is possible: Box2D's always run, rapier's are chosen
-    /// when it is compiled.
-    fn set_timed(&mut self, _: bool) {}
 }
 
 /// A body after a step, in the precision of the engine.
@@ -39,34 +32,6 @@ pub struct State {
     pub velocity: [f32; 2],
     /// Angular velocity (rad/s).
     pub angular_velocity: f32,
-}
-
-/// Parts of a step that all three engines have in some form: bounds and new pairs; narrow phase and impulse
-/// matching; colors, lanes or islands; constraint records; warm starting; sweeps with position feedback; sweeps
-/// without it and restitution; velocities and positions of bodies; the sum of the last four, which is all that
-/// rapier reports; storing impulses and writing poses back.
-pub const STAGES: [&str; 10] = [
-    "pairs",
-    "collide",
-    "color",
-    "prepare",
-    "warm start",
-    "solve",
-    "relax",
-    "integrate",
-    "= stages",
-    "store",
-];
-/// Index of the sum.
-pub const SUM: usize = 8;
-
-/// Times by stage (ms); `None` where an engine does not report one.
-pub type Stages = [Option<f64>; STAGES.len()];
-
-/// All stages, from those before the substeps, those in them and the last one (ms).
-pub fn stages_of(before: [f64; 4], within: [f64; 4], store: f64) -> Stages {
-    let [[a, b, c, d], [e, f, g, h]] = [before, within];
-    [a, b, c, d, e, f, g, h, e + f + g + h, store].map(Some)
 }
 
 /// Which engine, and its lane width.

@@ -1,8 +1,7 @@
 //! This crate's `soft_step`, a schedule that the other two engines have as well, and its other solvers at
 //! their own settings.
 
-use crate::engine::{Contender, Engine, Maker, Stages, State, stages_of};
-use simpulse::engine::clock::Phase;
+use crate::engine::{Contender, Engine, Maker, State};
 use simpulse::engine::solvers;
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes::Scene;
@@ -47,17 +46,5 @@ impl Engine for Simpulse {
 
     fn points(&self) -> usize {
         self.0.counts.points
-    }
-
-    fn stages(&self) -> Stages {
-        let of = |phase: Phase| self.0.timings.phase_ns[phase as usize] as f64 * 1e-6;
-        let before = [Phase::Pairs, Phase::Collide, Phase::Color, Phase::Prepare].map(of);
-        let solve = of(Phase::Solve) + of(Phase::Position);
-        let relax = of(Phase::Relax) + of(Phase::Restitution);
-        stages_of(before, [of(Phase::WarmStart), solve, relax, of(Phase::Integrate)], of(Phase::Store))
-    }
-
-    fn set_timed(&mut self, on: bool) {
-        self.0.settings.timed = on;
     }
 }

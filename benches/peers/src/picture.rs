@@ -1,13 +1,9 @@
-//! `peers.svg`: time of a step against mean overlap, a panel per scene.
-//!
-//! Both axes are logarithmic; lower left is better. A setting that failed the check has no time and no point:
-//! it is listed below its panel.
+//! `peers.svg`: time of a step against mean overlap, a chart per scene; lower left is better. A setting that failed
+//! the check has no time: it is in the strip above its chart.
 
-use crate::axes::{Area, Drawn, Edges, INK, LogScale, color, marker, with_dark, write, write_upwards};
-use plotters::prelude::*;
-use plotters::style::text_anchor::HPos;
 use serde::Deserialize;
-use simpulse::lab::report::units::{si_short, wrapped};
+use simpulse::lab::chart::{self, Axis, Chart, ChartMark, FailStrip, Scale, Series, Style};
+use simpulse::lab::units::si_short;
 
 /// What is drawn of a row of `peers.csv`.
 #[derive(Debug, Deserialize)]
@@ -22,16 +18,9 @@ pub struct Row {
     penetration_mean_m: Option<f64>,
 }
 
+/// Charts beside each other, and the size of one (pixels).
 const COLUMNS: usize = 3;
-const PANEL: (i32, i32) = (360, 300);
-const LEGEND_HEIGHT: i32 = 62;
-/// Margins left of, right of, above and below a plot.
-const LEFT: i32 = 76;
-const RIGHT: i32 = 26;
-const TOP: i32 = 34;
-const BOTTOM: i32 = 66;
-/// Characters of a line below a panel.
-const LINE: usize = 56;
+const SIZE: [i32; 2] = [360, 300];
 
 /// Engines that are drawn, in the order of the legend, each at all its settings.
 const ENGINES: [&str; 4] = ["Box2D", "rapier", "simpulse soft_step", "simpulse shim"];
@@ -47,6 +36,11 @@ fn engine(row: &Row, own: &str) -> Option<usize> {
     }
 }
 
+/// `soft_step` at the width of the CPU.
+fn own(rows: &[Row]) -> &str {
+    rows.iter().find(|r| r.engine.starts_with("simpulse")).map_or("", |r| &r.engine)
+}
+
 /// A time up to this factor above that of `shim` counts as no longer.
 const LONGER: f64 = 1.1;
 
@@ -55,7 +49,7 @@ const LONGER: f64 = 1.1;
 pub fn equal_times(rows: &[Row]) -> String {
     let mut text = format!("| scene | {} |\n|---|---|---|---|---|", ENGINES.join(" | "));
     for scene in rows.chunk_by(|a, b| a.scene == b.scene) {
-        let own = scene.iter().find(|r| r.engine.starts_with("simpulse")).map_or("", |r| &r.engine);
+        let own = own(scene);
         let of = |k: usize| scene.iter().filter(move |row| engine(row, own) == Some(k));
         let timed = |row: &Row| Some((row.mean_step_ms?, row.penetration_mean_m?));
         let Some((limit, _)) = of(3).find(|row| row.substeps == 14).and_then(timed) else { continue };
@@ -75,79 +69,40 @@ pub fn equal_times(rows: &[Row]) -> String {
 }
 
 /// The picture of all rows of a race, as SVG text.
-pub fn svg(rows: &[Row]) -> Result<String, String> {
-    let mut text = String::new();
-    draw(&rows.chunk_by(|a, b| a.scene == b.scene).collect::<Vec<_>>(), &mut text)
-        .map_err(|e| format!("peers.svg: {e}"))?;
-    Ok(with_dark(&text))
+pub fn svg(rows: &[Row]) -> String {
+    let charts: Vec<Chart> = rows.chunk_by(|a, b| a.scene == b.scene).map(chart).collect();
+    let lines: Vec<_> = charts.chunks(COLUMNS).map(|line| (String::new(), line.to_vec())).collect();
+    let names: Vec<_> = ENGINES.into_iter().enumerate().map(|(k, name)| (name, Style::at(k))).collect();
+    let title = "Time of a step against overlap, in one run: lower left is better. \
+                 Number: substeps; ′: contacts at 60 Hz, not 30; shim has its own";
+    chart::file(title, &names, &lines)
 }
 
-fn draw(scenes: &[&[Row]], text: &mut String) -> Drawn {
-    let rows = scenes.len().div_ceil(COLUMNS) as i32;
-    let size = ((COLUMNS as i32 * PANEL.0) as u32, (LEGEND_HEIGHT + rows * PANEL.1) as u32);
-    let root = SVGBackend::with_string(text, size).into_drawing_area();
-    root.fill(&WHITE)?;
-    write(
-        &root,
-        "Time of a step against overlap, in one run: lower left is better",
-        (8, 18),
-        18,
-        HPos::Left,
-    )?;
-    let mut x = 12;
-    for (k, name) in ENGINES.into_iter().enumerate() {
-        marker(&root, (x, 44), k, &color(k))?;
-        write(&root, name, (x + 10, 44), 14, HPos::Left)?;
-        x += 34 + 8 * name.len() as i32;
+fn chart(rows: &[Row]) -> Chart {
+    let own = own(rows);
+    let mark = |k: usize, row: &Row| {
+        let fails = !row.failed.is_empty();
+        let overlap = row.penetration_mean_m.filter(|overlap| *overlap > 0.0)?;
+        let ms = if fails { 0.0 } else { row.mean_step_ms? };
+        let title = format!("{}, {} substeps at {} Hz", ENGINES[k], row.substeps, row.contact_hertz);
+        Some(ChartMark { fails, label: setting(row), ..ChartMark::at(overlap, 1e-3 * ms, 4.0, title) })
+    };
+    let series = |k: usize| {
+        let of = rows.iter().filter(|row| engine(row, own) == Some(k));
+        Series::marks(Style::at(k), of.filter_map(|row| mark(k, row)).collect())
+    };
+    let series: Vec<Series> = (0..ENGINES.len()).map(series).collect();
+    let marks = || series.iter().flat_map(|series| &series.marks);
+    let axis = |name: &str, scale: Scale| Axis { name: name.into(), scale };
+    Chart {
+        size: SIZE,
+        title: rows[0].scene.clone(),
+        x: axis("mean overlap", Scale::log(marks().map(|mark| mark.x), "m")),
+        y: axis("time of a step, mean", Scale::log(marks().map(|mark| mark.y), "s")),
+        strip: if marks().any(|mark| mark.fails) { FailStrip::Top } else { FailStrip::None },
+        good: [None; 2],
+        series,
     }
-    write(
-        &root,
-        "number: substeps; ′: contacts at 60 Hz, not 30; shim has its own",
-        (x, 44),
-        14,
-        HPos::Left,
-    )?;
-    for (i, rows) in scenes.iter().enumerate() {
-        let (column, row) = ((i % COLUMNS) as i32, (i / COLUMNS) as i32);
-        panel(&root, (column * PANEL.0, LEGEND_HEIGHT + row * PANEL.1), rows)?;
-    }
-    root.present()?;
-    Ok(())
-}
-
-fn panel(area: &Area, corner: (i32, i32), rows: &[Row]) -> Drawn {
-    let own = rows.iter().find(|r| r.engine.starts_with("simpulse")).map_or("", |r| &r.engine);
-    let all = rows.iter().filter_map(|row| Some((engine(row, own)?, row)));
-    let shown: Vec<(usize, &Row, f64, f64)> = all
-        .clone()
-        .filter_map(|(k, row)| Some((k, row, row.mean_step_ms?, row.penetration_mean_m?)))
-        .filter(|&(.., overlap)| overlap > 0.0)
-        .collect();
-    let (left, right) = (corner.0 + LEFT, corner.0 + PANEL.0 - RIGHT);
-    let (top, bottom) = (corner.1 + TOP, corner.1 + PANEL.1 - BOTTOM);
-    write(area, &rows[0].scene, (left, top - 14), 15, HPos::Left)?;
-    let overlaps = LogScale::of(shown.iter().map(|s| s.3), 5);
-    let times = LogScale::of(shown.iter().map(|s| s.2), 6);
-    let labels: [&dyn Fn(f64) -> String; 2] =
-        [&|overlap| si_short(overlap, "m"), &|ms| si_short(1e-3 * ms, "s")];
-    Edges { left, right, top, bottom }.grid(area, [&overlaps, &times], 12, labels)?;
-    area.draw(&Rectangle::new([(left, top), (right, bottom)], INK))?;
-    write_upwards(area, "time of a step, mean", (corner.0 + 14, (top + bottom) / 2), 12)?;
-    write(area, "mean overlap", ((left + right) / 2, bottom + 28), 13, HPos::Center)?;
-    for &(k, row, time, overlap) in &shown {
-        let (x, y) = (overlaps.pixel(overlap, left, right), times.pixel(time, bottom, top));
-        marker(area, (x, y), k, &color(k))?;
-        write(area, &setting(row), (x + 7, y - 7), 11, HPos::Left)?;
-    }
-    let failed = all.filter(|(_, row)| !row.failed.is_empty());
-    let failed: Vec<String> = failed.map(|(k, row)| format!("{} {}", ENGINES[k], setting(row))).collect();
-    if !failed.is_empty() {
-        let line = format!("fails: {}", failed.join(", "));
-        for (i, line) in wrapped(&line, LINE).iter().enumerate() {
-            write(area, line, (corner.0 + 8, bottom + 44 + 14 * i as i32), 11, HPos::Left)?;
-        }
-    }
-    Ok(())
 }
 
 fn setting(row: &Row) -> String {

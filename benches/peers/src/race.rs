@@ -8,7 +8,7 @@
 //! is printed next to it. The last second of the first run is not timed: it is used for the check.
 
 use crate::check::{Checker, Errors, WINDOW};
-use crate::engine::{Contender, Engine, Maker, SUM, Stages};
+use crate::engine::{Contender, Engine, Maker};
 use simpulse::engine::clock::waited;
 use simpulse::engine::lanes::native_width;
 use simpulse::lab::scenes::{self, Scene};
@@ -21,9 +21,6 @@ const BLOCK: u32 = 10;
 
 /// Blocks of a repeat begin this many steps before those of the previous repeat.
 const SHIFT: u32 = 3;
-
-/// In every fourth round the clocks inside the steps run, and whole steps are not timed.
-const CLOCKED_ROUND: u32 = 4;
 
 /// A block is dropped if the thread waited for a processor for more than this fraction of it (1).
 const WAITED: f64 = 0.01;
@@ -83,37 +80,8 @@ pub struct Outcome {
     pub step: Option<Steps>,
     /// Fraction of the time in which the thread waited for a processor (1); not part of any other time.
     pub waited: f64,
-    /// Times of the stages and of the whole step, with the clocks on (ms).
-    pub stages: Option<Breakdown>,
     /// Time of the whole run relative to `soft_step` at the width of the CPU and with as many substeps.
     pub ratio: Option<f64>,
-    /// The same ratio block by block, for warm start, solve, relax and integrate alone.
-    pub stages_ratio: Option<[f64; 3]>,
-}
-
-/// Times of a step by stage (ms). All are of the same steps, so that they add up.
-#[derive(Clone, Copy, Debug)]
-pub struct Breakdown {
-    /// By stage.
-    pub stages: Stages,
-    /// Time of the whole step.
-    pub step: f64,
-}
-
-impl Breakdown {
-    /// Mean of a sample; `None` if it is empty.
-    fn mean(sample: &[Self]) -> Option<Self> {
-        let count = sample.len() as f64;
-        let stage = |k| Some(sample.iter().map(|b: &Self| b.stages[k]).sum::<Option<f64>>()? / count);
-        let step = sample.iter().map(|b| b.step).sum::<f64>() / count;
-        (count > 0.0).then(|| Breakdown { stages: std::array::from_fn(stage), step })
-    }
-
-    /// Mean of the faster half of a block, which excludes interrupted steps.
-    fn of_block(mut sample: Vec<Self>) -> Option<Self> {
-        sample.sort_by(|a, b| a.step.total_cmp(&b.step));
-        Self::mean(&sample[..sample.len().div_ceil(2)])
-    }
 }
 
 /// A contender in the race.
@@ -127,8 +95,6 @@ struct Runner {
     steps: Vec<Vec<f64>>,
     /// Time in which the thread waited, and time in which blocks ran (ms).
     waited_and_ran: [f64; 2],
-    /// One per clocked block.
-    clocked: Vec<Breakdown>,
 }
 
 /// Runs a scene of the catalog or a `.json` file for `steps` steps, `repeats` times, with `seed` if it has
@@ -161,7 +127,6 @@ pub fn race(
             failed: None,
             steps: Vec::new(),
             waited_and_ran: [0.0; 2],
-            clocked: Vec::new(),
         });
     }
     for repeat in 0..repeats {
@@ -175,7 +140,7 @@ pub fn race(
         for (round, block) in (0..).zip(blocks(timed, repeat)) {
             for turn in 0..runners.len() {
                 let place = (turn + (round + repeat) as usize) % runners.len();
-                runners[place].block(block.clone(), round + repeat);
+                runners[place].block(block.clone());
             }
         }
         // Runs are deterministic, so one check is enough. It comes before any time is used.
@@ -195,20 +160,13 @@ impl Runner {
         let maker = Maker::Simpulse(native_width(), Default::default());
         let rival = Contender { maker, recycling: true, ..self.contender };
         let rival = all.iter().find(|r| r.contender == rival && r.failed.is_none()).filter(|_| timed);
-        let stages =
-            |r: &Runner| -> Vec<f64> { r.clocked.iter().filter_map(|block| block.stages[SUM]).collect() };
-        let by_block = |rival: &Runner| -> Vec<f64> {
-            stages(self).iter().zip(stages(rival)).map(|(a, b)| a / b).collect()
-        };
         let [waits, ran] = self.waited_and_ran;
         Outcome {
             contender: self.contender,
             counts: self.counts,
             step: Steps::of(&self.medians()).filter(|_| timed),
             waited: waits / (waits + ran).max(1e-9),
-            stages: Breakdown::mean(&self.clocked).filter(|_| timed),
             ratio: rival.and_then(|rival| whole(&self.medians(), &rival.medians())),
-            stages_ratio: rival.and_then(|rival| quartiles(&by_block(rival))),
             errors: self.errors.clone(),
             failed: self.failed.clone(),
         }
@@ -225,15 +183,12 @@ impl Runner {
     }
 
     /// Runs the steps of a block of the last repeat.
-    fn block(&mut self, steps: Range<u32>, round: u32) {
+    fn block(&mut self, steps: Range<u32>) {
         if self.failed.is_some() {
             return;
         }
         let before = waited();
-        let clocked = round % CLOCKED_ROUND == CLOCKED_ROUND - 1;
-        self.engine.set_timed(clocked);
         let mut times = Vec::with_capacity(steps.len());
-        let mut clocked_steps = Vec::new();
         for _ in steps.clone() {
             let start = Instant::now();
             let result = self.engine.step();
@@ -242,15 +197,6 @@ impl Runner {
                 self.failed = Some(message);
                 return;
             }
-            if clocked {
-                clocked_steps
-                    .extend(times.last().map(|&step| Breakdown { stages: self.engine.stages(), step }));
-            }
-        }
-        if clocked {
-            clocked_steps.remove(0);
-            self.clocked.extend(Breakdown::of_block(clocked_steps));
-            return;
         }
         let ran: f64 = times.iter().sum();
         let waits = waited().zip(before).map_or(0.0, |(after, before)| 1e3 * (after - before).as_secs_f64());
@@ -270,7 +216,6 @@ impl Runner {
 
     /// Runs the last `left` steps and checks the last second.
     fn check(&mut self, mut checker: Checker, left: u32, stands: bool) {
-        self.engine.set_timed(false);
         let mut observe = |left: u32| match self.engine.step() {
             Ok(()) if left < WINDOW => checker.observe(&*self.engine, left),
             stepped => stepped,

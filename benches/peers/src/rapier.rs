@@ -1,6 +1,6 @@
 //! rapier2d.
 
-use crate::engine::{Contender, Engine, SUM, Stages, State};
+use crate::engine::{Contender, Engine, State};
 use rapier2d::prelude::*;
 use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::joints::JointKind;
@@ -169,19 +169,5 @@ impl Engine for Rapier {
     fn points(&self) -> usize {
         let pairs = self.world.narrow_phase.contact_pairs();
         pairs.flat_map(|p| p.solver_manifolds()).map(|m| m.data.solver_contacts.len()).sum()
-    }
-
-    fn stages(&self) -> Stages {
-        let c = &self.world.physics_pipeline.counters;
-        let mut stages = Stages::default();
-        if cfg!(feature = "rapier-phases") {
-            let pairs = c.cd.broad_phase_time.time_ms() + c.cd.final_broad_phase_time.time_ms();
-            stages[0] = Some(pairs);
-            stages[1] = Some(c.cd.narrow_phase_time.time_ms());
-            stages[2] = Some(c.stages.island_construction_time.time_ms());
-            stages[3] = Some(c.solver.velocity_assembly_time.time_ms());
-            stages[SUM] = Some(c.solver.velocity_resolution_time.time_ms());
-        }
-        stages
     }
 }

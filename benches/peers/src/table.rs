@@ -1,7 +1,6 @@
 //! Human-readable tables, and rows of `peers.csv`.
 
 use crate::check::Errors;
-use crate::engine::{STAGES, SUM};
 use crate::race::{Outcome, Steps};
 use comfy_table::{Table, presets::UTF8_FULL_CONDENSED};
 
@@ -11,8 +10,7 @@ const NONE: &str = "–";
 const ALLOWED: f64 = 1.1;
 
 /// Times and errors, one row per contender. `ms/step` is the mean over the run, and `× simpulse` is the ratio
-/// of whole runs. `stages ×` is the ratio of blocks, with quartiles. `lost` pairs overlap past the middle of
-/// a body.
+/// of whole runs. `lost` pairs overlap past the middle of a body.
 pub fn comparison(outcomes: &[Outcome]) -> Table {
     let mut table = head(&[
         "engine",
@@ -22,7 +20,6 @@ pub fn comparison(outcomes: &[Outcome]) -> Table {
         "spread",
         "longest",
         "× simpulse",
-        "stages ×",
         "pen. mean mm",
         "pen. max mm",
         "lost %",
@@ -44,7 +41,6 @@ pub fn comparison(outcomes: &[Outcome]) -> Table {
             }),
             ms(o, |s| s.longest),
             o.ratio.map_or(NONE.into(), |ratio| format!("{ratio:.2}")),
-            factor(&o.stages_ratio),
         ];
         if let Some(e) = &o.errors {
             let truth = |(_, unit, error)| format!("{} {unit}", significant(error));
@@ -64,24 +60,6 @@ pub fn comparison(outcomes: &[Outcome]) -> Table {
             row.resize(table.column_count() - 1, NONE.into());
             row.push(format!("FAILED: {message}"));
         }
-        table.add_row(row);
-    }
-    table
-}
-
-/// Time by stage at four substeps (ms per step).
-pub fn stages(outcomes: &[Outcome]) -> Table {
-    let mut table = head(&[&["engine"], &STAGES[..], &["rest", "step"]].concat());
-    for o in outcomes.iter().filter(|o| o.contender.substeps == 4) {
-        let Some(b) = &o.stages else { continue };
-        let anew = if o.contender.recycling { "" } else { ", no recycling" };
-        let mut row = vec![o.contender.name() + anew];
-        row.extend(b.stages.map(|ms| ms.map_or(NONE.into(), significant)));
-        // The four stages before the sum are part of it.
-        let counted = [&b.stages[..SUM - 4], &b.stages[SUM..]].concat();
-        let rest = b.step - counted.iter().flatten().sum::<f64>();
-        row.push(b.stages[SUM].map_or(NONE.into(), |_| significant(rest)));
-        row.push(significant(b.step));
         table.add_row(row);
     }
     table
@@ -140,7 +118,6 @@ pub fn summary_line(scene: &str, outcomes: &[Outcome]) -> String {
         scene.to_string(),
         cell(ours, |o| ms(o, |s| s.mean)),
         cell(box2d, |o| o.ratio.map_or(NONE.into(), |ratio| format!("{ratio:.2}"))),
-        cell(box2d, |o| factor(&o.stages_ratio)),
         cell(rapier, |o| o.ratio.map_or(NONE.into(), |ratio| format!("{ratio:.2}"))),
         engines.map(|o| cell(o, |o| ms(o, |s| s.longest))).join(" / "),
         errors(|e| e.penetration_mean),
@@ -153,8 +130,8 @@ pub fn summary_line(scene: &str, outcomes: &[Outcome]) -> String {
 
 /// Header of the summary.
 pub const SUMMARY: &str = "\
-| scene | simpulse ms | Box2D × | its stages × | rapier × | longest step ms s / B / r | mean overlap mm s / B / r | max overlap mm s / B / r | rms velocity mm/s s / B / r | gap of joints mm s / B / r |
-|---|---|---|---|---|---|---|---|---|---|";
+| scene | simpulse ms | Box2D × | rapier × | longest step ms s / B / r | mean overlap mm s / B / r | max overlap mm s / B / r | rms velocity mm/s s / B / r | gap of joints mm s / B / r |
+|---|---|---|---|---|---|---|---|---|";
 
 /// A row of `peers.csv`: every column with its value, empty if there is none. No times if the check failed.
 pub fn row(scene: &str, o: &Outcome) -> Vec<(&'static str, String)> {
@@ -163,7 +140,7 @@ pub fn row(scene: &str, o: &Outcome) -> Vec<(&'static str, String)> {
     let error = |of: fn(&Errors) -> Option<f64>| number(o.errors.as_ref().and_then(of));
     let truth = o.errors.as_ref().and_then(|e| e.truth);
     let c = &o.contender;
-    let mut row = vec![
+    vec![
         ("scene", scene.to_string()),
         ("engine", c.name()),
         ("substeps", c.substeps.to_string()),
@@ -177,25 +154,6 @@ pub fn row(scene: &str, o: &Outcome) -> Vec<(&'static str, String)> {
         ("longest_step_ms", step(|s| s.longest)),
         ("waited_share", o.waited.to_string()),
         ("whole_run_ratio", number(o.ratio)),
-        ("stages_ratio", number(o.stages_ratio.map(|q| q[1]))),
-        ("clocked_step_ms", number(o.stages.map(|b| b.step))),
-    ];
-    const NAMES: [&str; STAGES.len()] = [
-        "pairs_ms",
-        "collide_ms",
-        "color_ms",
-        "prepare_ms",
-        "warm_start_ms",
-        "solve_ms",
-        "relax_ms",
-        "integrate_ms",
-        "stages_ms",
-        "store_ms",
-    ];
-    row.extend(
-        NAMES.into_iter().enumerate().map(|(k, name)| (name, number(o.stages.and_then(|b| b.stages[k])))),
-    );
-    row.extend([
         ("bodies", o.counts.0.to_string()),
         ("points", o.counts.1.to_string()),
         ("pairs", error(|e| Some(e.pairs as f64))),
@@ -209,8 +167,7 @@ pub fn row(scene: &str, o: &Outcome) -> Vec<(&'static str, String)> {
         ("reference", truth.map_or(String::new(), |t| t.0.into())),
         ("reference_unit", truth.map_or(String::new(), |t| t.1.into())),
         ("reference_error", number(truth.map(|t| t.2))),
-    ]);
-    row
+    ]
 }
 
 /// An empty table with these columns.
@@ -232,8 +189,4 @@ fn significant(x: f64) -> String {
     }
     let digits = if x == 0.0 { 0 } else { (2 - x.abs().log10().floor() as i32).clamp(0, 5) };
     format!("{x:.*}", digits as usize)
-}
-
-fn factor(q: &Option<[f64; 3]>) -> String {
-    q.map_or(NONE.into(), |[low, median, high]| format!("{median:.2} [{low:.2}, {high:.2}]"))
 }

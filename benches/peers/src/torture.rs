@@ -10,7 +10,6 @@ use simpulse::lab::study::sample::quantile;
 use simpulse::lab::torture::families::Family;
 use simpulse::lab::torture::{self, Campaign, CaseOutcome, TortureCase, TortureRow, table};
 use std::io::IsTerminal;
-use std::path::Path;
 
 /// Another engine, behind the interface of the checks.
 struct Judged(Box<dyn Engine>);
@@ -97,15 +96,8 @@ fn time(case: &TortureCase, contender: &Contender, least: &mut Vec<f64>) -> Resu
     Ok(())
 }
 
-/// Times the scenes of a campaign `repeats` times in each engine, in turns, and prints a table; writes the rows of
-/// all scenes to a CSV file. Errors: the file.
-pub fn compare(campaign: &Campaign, repeats: u32, log: Option<&Path>) -> Result<(), String> {
-    let failed = |e: csv::Error| format!("{}: {e}", log.map_or(String::new(), |p| p.display().to_string()));
-    let mut csv = log.map(csv::Writer::from_path).transpose().map_err(failed)?;
-    if let Some(csv) = &mut csv {
-        let names = ["family", "number", "engine", "first", "longest", "longest_step", "mean"];
-        csv.write_record(names).map_err(failed)?;
-    }
+/// Times the scenes of a campaign `repeats` times in each engine, in turns, and prints a table.
+pub fn compare(campaign: &Campaign, repeats: u32) {
     let (mut rows, mut refused) = (Vec::new(), 0);
     let scenes = campaign.list();
     for (k, &(family, number)) in scenes.iter().enumerate() {
@@ -119,23 +111,15 @@ pub fn compare(campaign: &Campaign, repeats: u32, log: Option<&Path>) -> Result<
             refused += 1;
             continue;
         }
-        let scene = steps.each_ref().map(|steps| StepTimes {
+        rows.push(steps.each_ref().map(|steps| StepTimes {
             family: family.name,
             longest: quantile(steps, 1.0),
             mean: steps.iter().sum::<f64>() / steps.len().max(1) as f64,
-        });
-        for (((engine, _), steps), times) in TIMED.iter().zip(&steps).zip(&scene) {
-            let Some(csv) = &mut csv else { break };
-            let at = steps.iter().position(|&us| us == times.longest).unwrap_or(0) + 1;
-            let row = (family.name, number, engine, steps.first(), times.longest, at, times.mean);
-            csv.serialize(row).and_then(|()| Ok(csv.flush()?)).map_err(failed)?;
-        }
-        rows.push(scene);
+        }));
     }
     let reference = TIMED[0].0;
     println!("Step times ÷ those of {reference} in the same scene, on one thread; {refused} scenes refused");
     println!("{}", ratios(&campaign.families, &rows));
-    Ok(())
 }
 
 /// One line per family and engine, then all families together.

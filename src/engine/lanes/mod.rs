@@ -27,7 +27,7 @@ pub use frame::align_frame;
 pub use index::{IndexList, Indices, LaneIndex, MOST_LANES};
 pub use quads::{Quad, prefetch, prefetch_quad, prefetch_records};
 pub use rows::BodyRow;
-pub use store::{RowColumns, RowStore};
+pub use store::RowStore;
 pub use unused::unused_cpu_features;
 pub use vector::{FUSED, Lanes};
 pub use width::{LaneWidth, native_width, target_features};

@@ -1,7 +1,7 @@
 //! Rows of bodies, which sweeps gather and scatter.
 //!
 //! A row is two quads, and [`super::quads`] moves it by halves. Sixteen bodies are gathered by whole rows
-//! instead, which takes half the loads. Gathers and scatters of single columns exist for comparison.
+//! instead, which takes half the loads.
 
 #![allow(
     unsafe_code,
@@ -21,29 +21,8 @@ pub struct BodyRow {
     pub delta: [f32; 4],
 }
 
-/// `values[index[lane]]` in every lane, one after the other.
-#[inline(always)]
-pub fn load_each<V: Pod, const W: usize>(values: &[f32], index: LaneIndex<[u32; W]>) -> V {
-    assert_fits(index.bound(), values.len(), 1);
-    // SAFETY: every entry is below the bound.
-    bytemuck::cast(index.array().map(|i| unsafe { *values.get_unchecked(i as usize) }))
-}
-
-/// `values[index[lane]] = v[lane]`, in lane order.
-#[inline(always)]
-pub fn store_each<V: Pod, const W: usize>(values: &mut [f32], index: LaneIndex<[u32; W]>, v: V) {
-    assert_fits(index.bound(), values.len(), 1);
-    let floats: [f32; W] = bytemuck::cast(v);
-    for (&i, float) in index.array().iter().zip(floats) {
-        // SAFETY: every entry is below the bound.
-        unsafe { *values.get_unchecked_mut(i as usize) = float };
-    }
-}
-
-#[cfg(not(all(target_arch = "x86_64", target_feature = "avx512f")))]
-pub use self::{load_each as load_at_16, store_each as store_at_16};
 #[cfg(all(target_arch = "x86_64", target_feature = "avx512f"))]
-pub use avx512::{gather_16, load_at_16, store_at_16};
+pub use avx512::gather_16;
 
 /// By half rows, if there are no instructions for 16 lanes.
 #[cfg(not(all(target_arch = "x86_64", target_feature = "avx512f")))]
@@ -94,7 +73,7 @@ mod avx {
 
 #[cfg(all(target_arch = "x86_64", target_feature = "avx512f"))]
 mod avx512 {
-    use super::super::quads::avx512::{from, into, transpose};
+    use super::super::quads::avx512::{from, transpose};
     use super::{BodyRow, LaneIndex, assert_fits};
     use std::arch::x86_64::*;
     use wide::f32x16;
@@ -147,29 +126,6 @@ mod avx512 {
             let velocity = |c: usize| from(_mm512_shuffle_f32x4::<0b10_00_10_00>(p[c], q[c]));
             let delta = |c: usize| from(_mm512_shuffle_f32x4::<0b11_01_11_01>(p[c], q[c]));
             [velocity(0), velocity(1), velocity(2), velocity(3), delta(0), delta(1), delta(2), delta(3)]
-        }
-    }
-
-    /// The instructions treat indices as signed, so only the first 2³¹ values can be accessed.
-    const SIGNED: usize = 1 << 31;
-
-    #[inline(always)]
-    pub fn load_at_16(values: &[f32], index: LaneIndex<[u32; 16]>) -> f32x16 {
-        assert_fits(index.bound(), values.len().min(SIGNED), 1);
-        // SAFETY: every entry is below the bound, and so not negative; the load of indices is unaligned.
-        from(unsafe {
-            let index = _mm512_loadu_si512(index.array().as_ptr().cast());
-            _mm512_i32gather_ps::<4>(index, values.as_ptr())
-        })
-    }
-
-    #[inline(always)]
-    pub fn store_at_16(values: &mut [f32], index: LaneIndex<[u32; 16]>, v: f32x16) {
-        assert_fits(index.bound(), values.len().min(SIGNED), 1);
-        // SAFETY: as above.
-        unsafe {
-            let index = _mm512_loadu_si512(index.array().as_ptr().cast());
-            _mm512_i32scatter_ps::<4>(values.as_mut_ptr(), index, into(v));
         }
     }
 }

@@ -2,7 +2,6 @@
 
 use super::index::LaneIndex;
 use super::quads::{self, Quad};
-use super::rows;
 use super::vector::{FUSED, INTEGERS, Lanes, MANTISSA};
 
 impl Lanes for f32 {
@@ -84,15 +83,5 @@ impl Lanes for f32 {
     #[inline(always)]
     fn integer_bits(self) -> Self {
         f32::from_bits((self + INTEGERS).to_bits() & MANTISSA)
-    }
-
-    #[inline(always)]
-    fn load_at(values: &[f32], index: LaneIndex<Self::Index>) -> Self {
-        rows::load_each(values, index)
-    }
-
-    #[inline(always)]
-    fn store_at(values: &mut [f32], index: LaneIndex<Self::Index>, v: Self) {
-        rows::store_each(values, index, v)
     }
 }

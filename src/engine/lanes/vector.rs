@@ -8,7 +8,7 @@
 //!   are unordered, as the x86 instructions do.
 //! * No reciprocal estimates.
 
-use super::index::LaneIndex;
+use super::index::{LaneIndex, assert_fits};
 use super::quads::Quad;
 use super::rows::BodyRow;
 use bytemuck::Pod;
@@ -133,13 +133,25 @@ pub trait Lanes:
     ///
     /// # Panics
     /// If there are fewer values than the bound of `index`.
-    fn load_at(values: &[f32], index: LaneIndex<Self::Index>) -> Self;
+    #[inline(always)]
+    fn load_at(values: &[f32], index: LaneIndex<Self::Index>) -> Self {
+        assert_fits(index.bound(), values.len(), 1);
+        let mut v = Self::zero();
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut v));
+        floats.iter_mut().zip(index.entries()).for_each(|(float, &i)| *float = values[i as usize]);
+        v
+    }
 
     /// `values[index[lane]] = v[lane]`, in lane order.
     ///
     /// # Panics
     /// As [`Self::load_at`].
-    fn store_at(values: &mut [f32], index: LaneIndex<Self::Index>, v: Self);
+    #[inline(always)]
+    fn store_at(values: &mut [f32], index: LaneIndex<Self::Index>, v: Self) {
+        assert_fits(index.bound(), values.len(), 1);
+        let floats: &[f32] = bytemuck::cast_slice(std::slice::from_ref(&v));
+        floats.iter().zip(index.entries()).for_each(|(float, &i)| values[i as usize] = *float);
+    }
 
     /// Zero in every lane.
     #[inline(always)]

@@ -8,8 +8,8 @@ use bytemuck::Zeroable;
 use wide::{f32x4, f32x8, f32x16};
 
 macro_rules! wide_lanes {
-    ($type:ty, $width:literal, quads: $gather_quads:ident, $scatter:ident, $halves:ident,
-     columns: $load:ident, $store:ident $(, rows: $gather:ident)? $(, whole: $whole:ident)?) => {
+    ($type:ty, $width:literal, quads: $gather_quads:ident, $scatter:ident, $halves:ident
+     $(, rows: $gather:ident)? $(, whole: $whole:ident)?) => {
         impl Lanes for $type {
             const WIDTH: usize = $width;
 
@@ -104,30 +104,18 @@ macro_rules! wide_lanes {
             fn integer_bits(self) -> Self {
                 (self + <$type>::splat(INTEGERS)) & <$type>::splat(f32::from_bits(MANTISSA))
             }
-
-            #[inline(always)]
-            fn load_at(values: &[f32], index: LaneIndex<Self::Index>) -> Self {
-                rows::$load(values, index)
-            }
-
-            #[inline(always)]
-            fn store_at(values: &mut [f32], index: LaneIndex<Self::Index>, v: Self) {
-                rows::$store(values, index, v)
-            }
         }
     };
 }
 
-wide_lanes!(f32x4, 4, quads: gather_4, scatter_4, scatter_halves_4, columns: load_each, store_each);
-wide_lanes!(f32x8, 8, quads: gather_8, scatter_8, scatter_halves_8,
-    columns: load_each, store_each, whole: gather_8);
-wide_lanes!(f32x16, 16, quads: gather_16, scatter_16, scatter_halves_16,
-    columns: load_at_16, store_at_16, rows: gather_16);
+wide_lanes!(f32x4, 4, quads: gather_4, scatter_4, scatter_halves_4);
+wide_lanes!(f32x8, 8, quads: gather_8, scatter_8, scatter_halves_8, whole: gather_8);
+wide_lanes!(f32x16, 16, quads: gather_16, scatter_16, scatter_halves_16, rows: gather_16);
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::{IndexList, MOST_LANES, RowColumns, RowStore};
+    use crate::lanes::{IndexList, MOST_LANES};
     use proptest::prelude::*;
 
     /// Awkward values, as often as ordinary ones.
@@ -213,13 +201,6 @@ mod tests {
             prop_assert_eq!(deltas[i].delta, rows[i].delta.map(|x| x + add));
             prop_assert_eq!(deltas[i].velocity, rows[i].velocity);
         }
-        let mut columns = RowColumns::from_rows(&rows);
-        prop_assert_eq!(columns.gather::<L>(at).map(floats), v.map(floats));
-        columns.scatter_velocity(at, [plus(v[0]), plus(v[1]), plus(v[2]), v[3]]);
-        for (got, row) in velocities.iter_mut().zip(&rows) {
-            got.velocity[3] = row.velocity[3];
-        }
-        prop_assert_eq!(columns.to_rows(), velocities);
         Ok(())
     }
 

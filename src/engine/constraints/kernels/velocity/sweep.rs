@@ -392,13 +392,3 @@ pub fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule>(
 ) {
     rule.sweep::<L, N>(rows, batches);
 }
-
-/// As [`sweep`], on another row store: to measure the cost of that store.
-#[inline(never)]
-pub fn sweep_store<L: Lanes, N: KernelFeatures, R: NormalRule, S: RowStore>(
-    rows: &mut S,
-    batches: &mut Batches,
-    rule: R,
-) {
-    over_segments!(sweep_segment, L, N, R, S; rows, batches, rule);
-}
