@@ -7,7 +7,7 @@ use simpulse::engine::constraints::ImpactLaw;
 use simpulse::engine::constraints::impacts::restitution::{self, ReadApproach, Rebound};
 use simpulse::engine::constraints::kernels::position::position_sweep;
 use simpulse::engine::constraints::kernels::velocity::rules::Rigid;
-use simpulse::engine::constraints::kernels::velocity::sweep::{self, sweep};
+use simpulse::engine::constraints::kernels::velocity::sweep::sweep;
 use simpulse::engine::constraints::kernels::velocity::warm_start::warm_start;
 use simpulse::engine::constraints::records::bounces::Bounces;
 use simpulse::engine::constraints::{

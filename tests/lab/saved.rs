@@ -46,7 +46,7 @@ fn what_does_not_fit_together_is_refused() {
     let cases: [(&Change, &str); 7] = [
         (&|v| v["settings"]["solver"] = "nobody".into(), "unknown solver 'nobody'"),
         (&|v| v["settings"]["lanes"] = 5.into(), "5 lanes"),
-        (&|v| v["group"] = serde_json::json!([1]), "other lengths"),
+        (&|v| v["bodies"]["group"] = serde_json::json!([1]), "other lengths"),
         (&|v| v["contacts"][0]["body_a"] = 1000.into(), "contacts[0]"),
         (&|v| v["slots"]["first_shape"][1] = 5.into(), "its shapes begin at 5"),
         (&|v| v["slots"]["free"] = serde_json::json!([99]), "none of"),

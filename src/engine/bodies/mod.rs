@@ -44,6 +44,7 @@ impl BodyHandle {
 
 /// State of all bodies, one array per quantity, `[len]` each.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Bodies {
     /// Center of mass, x (m).
     pub position_x: LaneVec,
@@ -152,34 +153,6 @@ impl Bodies {
     }
 
     /// Every array of floats, in the order of their declaration.
-    #[cfg(feature = "serde")]
-    pub(crate) fn arrays(&self) -> [&LaneVec; 17] {
-        let Bodies { position_x, position_y, position_x_lo, position_y_lo, .. } = self;
-        let Bodies { rotation_cos, rotation_sin, velocity_x, velocity_y, angular_velocity, .. } = self;
-        let Bodies { inv_mass, inv_inertia, force_x, force_y, torque, .. } = self;
-        let Bodies { gravity_scale, linear_damping, angular_damping, .. } = self;
-        [
-            position_x,
-            position_y,
-            position_x_lo,
-            position_y_lo,
-            rotation_cos,
-            rotation_sin,
-            velocity_x,
-            velocity_y,
-            angular_velocity,
-            inv_mass,
-            inv_inertia,
-            force_x,
-            force_y,
-            torque,
-            gravity_scale,
-            linear_damping,
-            angular_damping,
-        ]
-    }
-
-    /// Every array of floats, mutable, in the order of their declaration.
     pub(crate) fn arrays_mut(&mut self) -> [&mut LaneVec; 17] {
         [
             &mut self.position_x,

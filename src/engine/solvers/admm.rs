@@ -148,19 +148,10 @@ impl Solver for Admm {
             passes.integrate_velocities();
             passes.with_system(Phase::Solve, |system| velocities(system.rows(), &mut self.free));
             passes.warm_start();
-            let mut v = AdmmVectors {
-                bias: passes.vector(),
-                mass: passes.vector(),
-                compliance: passes.vector(),
-                lambda: passes.vector(),
-                z: passes.vector(),
-                w: passes.vector(),
-                u: passes.vector(),
-                target: passes.vector(),
-                trial: passes.vector(),
-                image: passes.vector(),
-                direction: passes.vector(),
-            };
+            let [bias, mass, compliance, lambda, z, w, u, target, trial, image, direction] =
+                [(); 11].map(|()| passes.vector());
+            let mut v =
+                AdmmVectors { bias, mass, compliance, lambda, z, w, u, target, trial, image, direction };
             passes.with_system(Phase::Solve, |system| {
                 self.begin(system, &mut v, rule);
                 if substep == 0 || system.has_joints() {

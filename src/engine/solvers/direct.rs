@@ -261,7 +261,7 @@ impl Island {
     fn new(mut law: IslandLaw, blocks: Vec<usize>) -> Self {
         law.couple();
         let mut factors = BlockLu::default();
-        factors.begin(law.neighbors.len(), |body| law.neighbors[body].iter().copied());
+        factors.begin(law.movable, |body| law.couplings.of(body));
         let impulses = law.start.clone();
         let arguments = law.arguments(&impulses);
         let merit = law.merit(&impulses, &arguments);

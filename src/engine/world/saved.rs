@@ -9,14 +9,13 @@ use super::events::Events;
 use super::joints::SavedJoints;
 use super::traits::Traits;
 use super::{Settings, World};
-use crate::bodies::{BodyDef, BodyKind};
+use crate::bodies::{Bodies, BodyDef};
 use crate::constraints::records::kept::SolverState;
 use crate::contacts::Contact;
 use crate::lanes::LaneWidth;
 use crate::narrowphase::frozen::FrozenContacts;
 use crate::shapes::{MassProperties, Shape};
 use crate::solvers::{self, Variant};
-use glam::Vec2;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Default length unit of saved settings: one meter.
@@ -57,13 +56,7 @@ struct SavedWorld {
     settings: Settings,
     step_index: u64,
     slots: Slots,
-    kind: Vec<BodyKind>,
-    group: Vec<i32>,
-    bullet: Vec<bool>,
-    round: Vec<bool>,
-    local_center: Vec<Vec2>,
-    /// The arrays of floats, in the order of [`Bodies::arrays`](crate::bodies::Bodies::arrays).
-    floats: Vec<Vec<f32>>,
+    bodies: Bodies,
     shapes: Vec<Shape>,
     /// Friction and restitution of each shape.
     surfaces: Vec<[f32; 2]>,
@@ -86,17 +79,11 @@ impl Serialize for World {
             let message = "constraints of the caller's own types cannot be saved";
             return Err(serde::ser::Error::custom(message));
         }
-        let b = &self.bodies;
         let saved = SavedWorld {
             settings: self.settings.clone(),
             step_index: self.step_index,
             slots: self.slots.clone(),
-            kind: b.kind.clone(),
-            group: b.group.clone(),
-            bullet: b.bullet.clone(),
-            round: b.round.clone(),
-            local_center: b.local_center.clone(),
-            floats: b.arrays().map(|array| array.to_vec()).into(),
+            bodies: self.bodies.clone(),
             shapes: self.shapes.clone(),
             surfaces: self.surfaces.iter().map(|s| [s.friction, s.restitution]).collect(),
             contacts: self.contacts.clone(),
@@ -114,7 +101,7 @@ impl Serialize for World {
 
 impl<'de> Deserialize<'de> for World {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        let saved = SavedWorld::deserialize(from)?;
+        let mut saved = SavedWorld::deserialize(from)?;
         saved.check().map_err(serde::de::Error::custom)?;
         Ok(saved.restore())
     }
@@ -122,20 +109,21 @@ impl<'de> Deserialize<'de> for World {
 
 impl SavedWorld {
     /// Whether all arrays have matching lengths and all indices are valid.
-    fn check(&self) -> Result<(), String> {
-        let (n, shapes) = (self.kind.len(), self.shapes.len());
-        let s = &self.slots;
+    fn check(&mut self) -> Result<(), String> {
+        let (n, shapes) = (self.bodies.len(), self.shapes.len());
+        let floats = self.bodies.arrays_mut().map(|array| array.len());
+        let (b, s) = (&self.bodies, &self.slots);
         let lengths = [
-            self.group.len(),
-            self.bullet.len(),
-            self.round.len(),
-            self.local_center.len(),
+            b.group.len(),
+            b.bullet.len(),
+            b.round.len(),
+            b.local_center.len(),
             s.generation.len(),
             s.lives.len(),
             s.first_shape.len(),
             s.shapes.len(),
         ];
-        if self.floats.len() != 17 || self.floats.iter().map(Vec::len).chain(lengths).any(|len| len != n) {
+        if floats.into_iter().chain(lengths).any(|len| len != n) {
             return Err(format!("arrays of bodies have other lengths than {n}"));
         }
         if self.surfaces.len() != shapes {
@@ -179,12 +167,7 @@ impl SavedWorld {
         for &count in &self.slots.shapes {
             world.push_body(&nothing, &MassProperties::ZERO, count as usize);
         }
-        let b = &mut world.bodies;
-        (b.kind, b.group, b.round, b.local_center) = (self.kind, self.group, self.round, self.local_center);
-        b.bullet = self.bullet;
-        for (array, saved) in b.arrays_mut().into_iter().zip(&self.floats) {
-            array.copy_from_slice(saved);
-        }
+        world.bodies = self.bodies;
         for (i, (shape, surface)) in self.shapes.into_iter().zip(self.surfaces).enumerate() {
             world.set_shape(i, world.shape_body[i] as usize, shape, surface);
         }

@@ -144,6 +144,36 @@ impl Envelope {
     }
 }
 
+/// Which rows of a system couple, besides with themselves; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub struct Couplings {
+    /// In both orders and sorted; and where the pairs of each row begin.
+    pairs: Vec<[usize; 2]>,
+    begins: Vec<usize>,
+}
+
+impl Couplings {
+    /// The couplings of `n` rows. A pair may be listed more than once.
+    pub fn begin(&mut self, n: usize, pairs: impl Iterator<Item = [usize; 2]>) {
+        self.pairs.clear();
+        for [a, b] in pairs {
+            // Points of one contact follow each other.
+            if self.pairs.last() != Some(&[b, a]) {
+                self.pairs.extend([[a, b], [b, a]]);
+            }
+        }
+        self.pairs.sort_unstable();
+        self.pairs.dedup();
+        self.begins.clear();
+        self.begins.extend((0..=n).map(|i| self.pairs.partition_point(|pair| pair[0] < i)));
+    }
+
+    /// The rows that couple with this one, ascending.
+    pub fn of(&self, row: usize) -> impl Iterator<Item = usize> {
+        self.pairs[self.begins[row]..self.begins[row + 1]].iter().map(|pair| pair[1])
+    }
+}
+
 /// Orders rows by breadth, island by island. Each island starts from the row that a search from its first row
 /// finds last. `order` becomes that order, `place` its inverse.
 pub fn by_breadth<I: Iterator<Item = usize>>(

@@ -11,7 +11,7 @@
 //! points they touch. The matrix is factorized as 1 + M^(−1/2) Jᵀ S J M^(−1/2). This form is symmetric,
 //! has no pivot below one whatever the masses, and drops bodies that do not move.
 
-use crate::constraints::numerics::envelope::Envelope;
+use crate::constraints::numerics::envelope::{Couplings, Envelope};
 use crate::constraints::records::rows::{ROWS, RowBlock};
 use crate::constraints::vectors::blocks::JointBlocks;
 use crate::constraints::vectors::system::{Pair, System};
@@ -21,9 +21,7 @@ use crate::lanes::BodyRow;
 #[derive(Clone, Debug, Default)]
 pub struct BodyMatrix {
     envelope: Envelope,
-    /// Pairs of coupled bodies, in both orders and sorted; and where the pairs of each body begin.
-    pairs: Vec<[u32; 2]>,
-    begins: Vec<usize>,
+    couplings: Couplings,
     /// M^(−1/2) of each body (kg^(−1/2), kg^(−1/2), kg^(−1/2) m⁻¹).
     roots: Vec<[f64; 3]>,
     surfaces: Vec<Pair>,
@@ -42,28 +40,11 @@ impl BodyMatrix {
             [mass, mass, inertia]
         }));
         let moves = |body: u32| self.roots.get(body as usize).is_some_and(|root| *root != [0.0; 3]);
-        self.pairs.clear();
         let ends = system.point_rows().map(|p| p.bodies).chain(joints.blocks.iter().map(|b| b.bodies));
-        for [a, b] in ends.filter(|ends| ends.iter().all(|&body| moves(body))) {
-            if self.pairs.last() != Some(&[b, a]) {
-                self.pairs.extend([[a, b], [b, a]]);
-            }
-        }
-        self.pairs.sort_unstable();
-        self.pairs.dedup();
+        let both = ends.filter(|ends| ends.iter().all(|&body| moves(body)));
         let count = self.roots.len();
-        self.begins.clear();
-        self.begins.resize(count + 1, self.pairs.len());
-        for (at, pair) in self.pairs.iter().enumerate().rev() {
-            self.begins[pair[0] as usize] = at;
-        }
-        for body in (0..count).rev() {
-            self.begins[body] = self.begins[body].min(self.begins[body + 1]);
-        }
-        let (pairs, begins) = (&self.pairs, &self.begins);
-        self.envelope.begin::<3, _>(count, |body| {
-            pairs[begins[body]..begins[body + 1]].iter().map(|pair| pair[1] as usize)
-        });
+        self.couplings.begin(count, both.map(|ends| ends.map(|body| body as usize)));
+        self.envelope.begin::<3, _>(count, |body| self.couplings.of(body));
         system.gaps_and_friction(&mut self.surfaces);
         self.envelope.entries()
     }

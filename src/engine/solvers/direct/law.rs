@@ -5,6 +5,7 @@ use super::{PASSES, PIVOTS, SHIFT, TOLERANCE};
 use crate::constraints::numerics::block_lu::{BlockLu, inverse};
 use crate::constraints::numerics::cone;
 use crate::constraints::numerics::coulomb_lcp::CoulombLcp;
+use crate::constraints::numerics::envelope::Couplings;
 use crate::constraints::records::rows::{RowBlock, RowLaw};
 use crate::constraints::vectors::system::{Pair, PointRows};
 use crate::lanes::BodyRow;
@@ -139,8 +140,9 @@ pub(super) struct IslandLaw {
     velocity: Vec<f64>,
     /// Diagonal of K + R (1/kg).
     diagonal: Vec<f64>,
-    /// For each movable body: itself, and the bodies connected to it by a row.
-    pub neighbors: Vec<Vec<usize>>,
+    /// Number of movable bodies, and which of them are connected by a row.
+    pub movable: usize,
+    pub couplings: Couplings,
 }
 
 impl IslandLaw {
@@ -159,8 +161,9 @@ impl IslandLaw {
             .flat_map(|p| [0, 1].map(|axis| row(bodies, p.bodies, [p.on(0, axis), p.on(1, axis)])));
         let rows = rows.collect();
         let (start, velocity) = (flat(impulses), flat(velocities));
-        let (bounds, joints, diagonal, neighbors) = (vec![], vec![], vec![], vec![]);
-        IslandLaw { friction, start, velocity, rows, bounds, joints, diagonal, neighbors, points }
+        let (bounds, joints, diagonal) = (vec![], vec![], vec![]);
+        let (movable, couplings) = (0, Couplings::default());
+        IslandLaw { friction, start, velocity, rows, bounds, joints, diagonal, movable, couplings, points }
     }
 
     /// Adds the rows of a joint block.
@@ -200,16 +203,9 @@ impl IslandLaw {
             let next = numbers.len();
             *side = *numbers.entry(*side).or_insert(next);
         }
-        self.neighbors = (0..numbers.len()).map(|body| vec![body]).collect();
-        for row in self.rows.iter().filter(|row| !row.movable.contains(&IMMOVABLE)) {
-            let [a, b] = row.movable;
-            self.neighbors[a].push(b);
-            self.neighbors[b].push(a);
-        }
-        for list in &mut self.neighbors {
-            list.sort_unstable();
-            list.dedup();
-        }
+        self.movable = numbers.len();
+        let pairs = self.rows.iter().map(|row| row.movable).filter(|pair| !pair.contains(&IMMOVABLE));
+        self.couplings.begin(self.movable, pairs);
         self.diagonal = self.rows.iter().map(|row| row.coupling(row)).collect();
         for joint in &self.joints {
             (0..joint.size).for_each(|k| self.diagonal[joint.first + k] += joint.r[k][k]);
@@ -218,7 +214,7 @@ impl IslandLaw {
 
     /// Velocity changes by impulses, scaled to unit masses.
     fn moved(&self, x: &[f64]) -> Vec<[f64; 3]> {
-        let mut moved = vec![[0.0; 3]; self.neighbors.len()];
+        let mut moved = vec![[0.0; 3]; self.movable];
         self.rows.iter().zip(x).filter(|(_, x)| **x != 0.0).for_each(|(row, x)| row.push(&mut moved, *x));
         moved
     }
@@ -389,7 +385,7 @@ impl IslandLaw {
         let groups = self.groups(&held)?;
         system.clear();
         let one = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        (0..self.neighbors.len()).for_each(|body| system.add(body, body, one));
+        (0..self.movable).for_each(|body| system.add(body, body, one));
         for group in &groups {
             // Rows of a group share their bodies.
             let (members, movable) = (&held[group.first..][..group.size], held[group.first].seen.movable);
@@ -426,7 +422,7 @@ impl IslandLaw {
         };
         // Qᵀ x
         let act = |x: &[f64]| {
-            let mut z = vec![[0.0; 3]; self.neighbors.len()];
+            let mut z = vec![[0.0; 3]; self.movable];
             held.iter().zip(x).for_each(|(row, x)| row.acts.push(&mut z, *x));
             z
         };

@@ -27,7 +27,7 @@
 use crate::constraints::System;
 use crate::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
 use crate::constraints::numerics::cone;
-use crate::constraints::numerics::envelope::Envelope;
+use crate::constraints::numerics::envelope::{Couplings, Envelope};
 use crate::constraints::records::rows::{RowBlock, RowLaw};
 use crate::constraints::vectors::blocks::JointBlocks;
 use crate::constraints::vectors::system::{Pair, PointRows};
@@ -269,13 +269,7 @@ impl Convex {
         let points: Vec<PointRows> = system.point_rows().collect();
         for point in &points {
             let [gap, friction] = surfaces[point.at];
-            // J of a point on one of its bodies, along u: ±u and ±r × u.
-            let on = |side: usize, axis: usize| {
-                let sign = if side == 0 { -1.0 } else { 1.0 };
-                let [x, y] = point.axes[axis];
-                [x, y, point.arms[axis][side]].map(|j| sign * f64::from(j))
-            };
-            let jacobian = [0, 1].map(|side| [on(side, 0), on(side, 1), [0.0; 3]]);
+            let jacobian = [0, 1].map(|side| [point.on(side, 0), point.on(side, 1), [0.0; 3]]);
             let target = [-f64::from(rule.bias(gap)), 0.0, 0.0];
             let bound = ImpulseBound::Cone(f64::from(friction));
             let mut block =
@@ -444,16 +438,10 @@ impl Convex {
 
     /// Sets the pattern of H.
     fn couple(&mut self) {
-        let n = self.bodies.len();
-        let mut pairs: Vec<[usize; 2]> = Vec::new();
-        for block in self.blocks.iter().filter(|block| !block.bodies.contains(&FIXED)) {
-            let [a, b] = block.bodies;
-            pairs.extend([[a, b], [b, a]]);
-        }
-        pairs.sort_unstable();
-        pairs.dedup();
-        let begins: Vec<usize> = (0..=n).map(|i| pairs.partition_point(|pair| pair[0] < i)).collect();
-        self.matrix.begin::<3, _>(n, |i| pairs[begins[i]..begins[i + 1]].iter().map(|pair| pair[1]));
+        let mut couplings = Couplings::default();
+        let pairs = self.blocks.iter().map(|block| block.bodies).filter(|pair| !pair.contains(&FIXED));
+        couplings.begin(self.bodies.len(), pairs);
+        self.matrix.begin::<3, _>(self.bodies.len(), |i| couplings.of(i));
         self.is_coupled = true;
     }
 
