@@ -3,7 +3,7 @@
 #[path = "lab/common.rs"]
 mod common;
 
-use simpulse::engine::solvers::{Law, VARIANTS, find};
+use simpulse::engine::solvers::{Guarantee, VARIANTS, find};
 use simpulse::engine::world::Settings;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -48,7 +48,7 @@ fn the_counter_counts() {
 fn a_steady_step_allocates_nothing() {
     for name in ["pyramid:10", "disc_column:10", "bounce"] {
         for variant in &VARIANTS {
-            if !variant.promises(Law::NoAllocation) {
+            if !variant.promises(Guarantee::NoAllocation) {
                 continue;
             }
             // Without friction a pyramid flows apart, so none of its steps is steady.

@@ -4,7 +4,6 @@
 mod advise;
 mod browser;
 mod documents;
-mod kept;
 mod replay;
 mod report;
 
@@ -695,4 +694,34 @@ fn what_a_stopped_study_has_finished_stays() {
     let study = StudyFile::read(&path.join("o")).unwrap();
     assert_eq!((study.scenes(), study.missing_scenes), (vec!["stack:2".into()], vec!["pyramid:60".into()]));
     assert!(entries(&path.join("o")).iter().all(|name| !name.starts_with('.')));
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_keeps_what_was_there_and_leaves_nothing_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    std::fs::create_dir(path.join("old")).unwrap();
+    std::fs::write(path.join("old/replay-1.rec"), "of before").unwrap();
+    for out in ["old", "new/inner"] {
+        // The folder is in use as soon as the study has begun.
+        let files = || std::fs::read_dir(path.join(out)).map_or(0, |all| all.count());
+        let is_used = || files() > usize::from(out == "old");
+        let study = format!("study --scenes pyramid:60 --solvers shim --out {out}");
+        let output = interrupted(path, &study, "-INT", is_used);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(130), "{message}");
+        assert!(message.contains("nothing written"), "{message}");
+    }
+    assert_eq!(std::fs::read_to_string(path.join("old/replay-1.rec")).unwrap(), "of before");
+    assert_eq!(std::fs::read_dir(path.join("old")).unwrap().count(), 1);
+    assert!(!path.join("new").exists());
+}
+
+#[test]
+fn a_sweep_says_which_values_are_the_same_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = "study --quick --scenes stack:2 --solvers soft_step --sweep contact-hertz=15,30,60,120";
+    let text = succeeds(folder.path(), words);
+    assert!(text.contains("30, 60, 120 Hz give the same run"), "{text}");
 }

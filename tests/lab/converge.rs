@@ -4,7 +4,7 @@ use simpulse::cli::converge::{ConvergeArgs, run as command};
 use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::params::Budget;
-use simpulse::engine::solvers::{self, Law, VARIANTS, Variant};
+use simpulse::engine::solvers::{self, Guarantee, VARIANTS, Variant};
 use simpulse::engine::world::{Order, World};
 use simpulse::lab::capture::capture;
 use simpulse::lab::chart::Style;
@@ -139,7 +139,7 @@ fn every_solver_converges_on_a_machine_with_contacts_motors_limits_and_springs()
     let report = converge(&problem, Some(&reference(&problem).unwrap()), &settings).unwrap();
     for curve in own(&report, false) {
         let (name, order, own) = (&curve.solver, curve.order, curve.own.smallest);
-        let converges = solvers::find(name).is_ok_and(|v| v.promises(Law::Converges));
+        let converges = solvers::find(name).is_ok_and(|v| v.promises(Guarantee::Converges));
         if curve.start == Start::Cold && own.is_finite() && converges {
             assert!(own < 1e-4, "{name} {order}: {own:e}");
         }
@@ -277,7 +277,7 @@ fn a_point_whose_load_and_friction_are_one_problem_needs_one_iteration() {
 #[test]
 fn every_solver_reaches_its_own_law_on_a_pyramid() {
     let Frozen { problem, reference } = frozen("box-pyramid-5");
-    let solvers = VARIANTS.iter().copied().filter(|v| v.promises(Law::Converges)).collect();
+    let solvers = VARIANTS.iter().copied().filter(|v| v.promises(Guarantee::Converges)).collect();
     let settings = ConvergeOptions { solvers, ..options(&[], 4000) };
     let report = converge(&problem, reference.as_ref(), &settings).unwrap();
     for curve in own(&report, false) {
@@ -371,7 +371,7 @@ fn a_replayed_problem_is_the_step_of_the_world() {
     };
     for name in ["pyramid:5", "disc_column:8", "card_house"] {
         // Divergence would make any difference large.
-        for variant in VARIANTS.iter().filter(|v| v.promises(Law::Converges)) {
+        for variant in VARIANTS.iter().filter(|v| v.promises(Guarantee::Converges)) {
             // Arms and v* differ in their last bits, 6e-8 of numbers near 1. A step turns that into a few
             // 1e-7 per sweep. Anderson mixing divides by the change of the residuals from sweep to sweep, a
             // fraction 1 − ρ of them. Sweeps of five rows have the rate ρ = cos²(π/10) = 0.904.

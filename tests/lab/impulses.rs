@@ -3,7 +3,7 @@
 use crate::common::totals;
 use proptest::prelude::*;
 use simpulse::engine::lanes::LaneWidth;
-use simpulse::engine::solvers::{Law, VARIANTS};
+use simpulse::engine::solvers::{Guarantee, VARIANTS};
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 
 #[test]
@@ -19,7 +19,7 @@ fn normal_impulses_push_and_friction_stays_in_its_cone() {
                         let (normal, tangent) = (point.normal_impulse, point.tangent_impulse);
                         assert!(normal >= 0.0, "{name} {}: {point:?}", variant.name);
                         let held = tangent.abs() <= contact.friction * normal;
-                        assert!(held || !variant.promises(Law::Cone), "{name} {}", variant.name);
+                        assert!(held || !variant.promises(Guarantee::Cone), "{name} {}", variant.name);
                         largest = largest.max(normal);
                     }
                 }
@@ -49,7 +49,7 @@ proptest! {
     #[test]
     fn momentum_is_kept(seed in prop::collection::vec(
         (-0.1..0.1, -0.1..0.1, -3.0..3.0, -3.0..3.0, -4.0..4.0), 25), width in 0..LaneWidth::ALL.len()) {
-        for variant in VARIANTS.iter().filter(|v| v.promises(Law::Momentum)) {
+        for variant in VARIANTS.iter().filter(|v| v.promises(Guarantee::Momentum)) {
             let settings = crate::common::with_width(variant, LaneWidth::ALL[width]);
             let mut world = cloud(&seed).build(settings).unwrap();
             let b = &world.bodies;

@@ -3,7 +3,7 @@
 
 use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::lanes::LaneWidth;
-use simpulse::engine::solvers::{DEFAULT, Law, VARIANTS, find};
+use simpulse::engine::solvers::{DEFAULT, Guarantee, VARIANTS, find};
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::metrics::state::Angles;
 use simpulse::lab::metrics::{Errors, Observation};
@@ -79,7 +79,7 @@ fn free_fall_keeps_everything_to_rounding() {
 
 #[test]
 fn the_ground_takes_the_momentum_that_weight_gives() {
-    for variant in VARIANTS.iter().filter(|v| v.promises(Law::Momentum)) {
+    for variant in VARIANTS.iter().filter(|v| v.promises(Guarantee::Momentum)) {
         // Boxes on a slope and on each other: impulses of both kinds, at both ends.
         for name in ["incline_slip", "pyramid:6", "friction_ramp"] {
             let errors = observe(&mut build(&scenes::load(name).unwrap().scene, variant.name), 120);

@@ -3,7 +3,7 @@
 use crate::common::{fastest, totals};
 use simpulse::engine::bodies::{BodyDef, BodyHandle, ShapeDef};
 use simpulse::engine::params::Without;
-use simpulse::engine::solvers::{Law, VARIANTS, Variant, find};
+use simpulse::engine::solvers::{Guarantee, VARIANTS, Variant, find};
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 
@@ -36,7 +36,7 @@ fn piles_of_a_few_boxes_stay_where_they_are() {
     for variant in VARIANTS {
         let ways = PILES.map(|pile| creep(pile, variant));
         println!("{:<16} {:.1e} {:.1e} {:.1e} m", variant.name, ways[0], ways[1], ways[2]);
-        if variant.promises(Law::Rest) && !ways.iter().all(|&way| way <= CREEP) {
+        if variant.promises(Guarantee::Rest) && !ways.iter().all(|&way| way <= CREEP) {
             wrong.push(format!("{}: {ways:?}", variant.name));
         }
     }
@@ -47,7 +47,7 @@ fn piles_of_a_few_boxes_stay_where_they_are() {
 fn not_every_solver_keeps_them() {
     // Otherwise the bound would exclude nothing.
     let variant = VARIANTS.iter().find(|v| v.name == "projection").unwrap();
-    assert!(!variant.promises(Law::Rest) && creep("stack:10", variant) > CREEP);
+    assert!(!variant.promises(Guarantee::Rest) && creep("stack:10", variant) > CREEP);
 }
 
 /// Forty frictionless discs in a row on the ground, pressed against a wall by a tenth of their weight. The

@@ -98,11 +98,6 @@ fn size_class(proxy: &Proxy) -> u8 {
 }
 
 impl HashGrid {
-    /// An empty grid.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// See [`super::BroadPhase::pairs`].
     pub fn pairs(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>) {
         self.fill(proxies);

@@ -60,11 +60,6 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// An empty tree.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// See [`super::BroadPhase::pairs`].
     pub fn pairs(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>) {
         if !self.has_order(proxies) {
@@ -400,7 +395,7 @@ mod tests {
 
     #[test]
     fn stays_a_tree_through_motion_and_removal() {
-        let mut tree = Tree::new();
+        let mut tree = Tree::default();
         let mut out = Vec::new();
         for (frame, count) in [(0, 400), (1, 400), (2, 90), (3, 1), (4, 0), (5, 2), (6, 400), (7, 399)] {
             let proxies = scene(frame, count);
@@ -414,7 +409,7 @@ mod tests {
     #[test]
     fn updates_equal_a_new_tree() {
         let mut proxies = scene(0, 5000);
-        let (mut tree, mut pairs, mut expected) = (Tree::new(), Vec::new(), Vec::new());
+        let (mut tree, mut pairs, mut expected) = (Tree::default(), Vec::new(), Vec::new());
         tree.pairs(&proxies, &mut pairs);
         for frame in 1..40 {
             let moved: Vec<u32> = (0..5000).filter(|i| (i * 7919 + frame) % (5000 / frame) == 0).collect();
@@ -426,20 +421,20 @@ mod tests {
             }
             tree.update(&proxies, &moved, &mut pairs);
             validate(&tree, &proxies);
-            Tree::new().pairs(&proxies, &mut expected);
+            Tree::default().pairs(&proxies, &mut expected);
             assert_eq!(pairs, expected, "frame {frame}");
         }
     }
 
     #[test]
     fn a_degraded_order_is_rebuilt() {
-        let mut tree = Tree::new();
+        let mut tree = Tree::default();
         let mut out = Vec::new();
         for frame in 0..200 {
             let proxies = scene(frame, 400);
             tree.pairs(&proxies, &mut out);
             let cost = tree.cost();
-            let mut fresh = Tree::new();
+            let mut fresh = Tree::default();
             fresh.pairs(&proxies, &mut out);
             assert!(cost <= 1.3 * fresh.cost(), "frame {frame}: {cost} against {}", fresh.cost());
         }

@@ -74,7 +74,7 @@ pub struct Mover {
     /// Pose of the center of mass at the start.
     pub pose: Pose,
     /// Displacement of the center of mass over the step (m).
-    pub way: Vec2,
+    pub displacement: Vec2,
     /// Rotation over the step (rad).
     pub turn: f32,
 }
@@ -83,7 +83,7 @@ impl Mover {
     /// Pose at a fraction of the step.
     fn at(&self, part: f32) -> Pose {
         Pose {
-            position: self.pose.position + part * self.way,
+            position: self.pose.position + part * self.displacement,
             rotation: Vec2::from_angle(part * self.turn).rotate(self.pose.rotation),
         }
     }
@@ -91,9 +91,9 @@ impl Mover {
     /// Its motion relative to the moving frame of `other`.
     fn against(&self, other: &Self) -> Self {
         let back = Vec2::from_angle(-other.turn);
-        let end = self.pose.position + self.way - other.pose.position - other.way;
-        let way = back.rotate(end) + other.pose.position - self.pose.position;
-        Mover { way, turn: self.turn - other.turn, ..*self }
+        let end = self.pose.position + self.displacement - other.pose.position - other.displacement;
+        let displacement = back.rotate(end) + other.pose.position - self.pose.position;
+        Mover { displacement, turn: self.turn - other.turn, ..*self }
     }
 }
 
@@ -111,7 +111,7 @@ pub fn impact([shape_a, shape_b]: [&Shape; 2], [a, b]: [&Mover; 2], slop: f32, l
         let manifold = pair.collide([&a.pose, &pose], FAR);
         let separations = manifold.points().iter().map(|p| p.separation);
         let distance = separations.fold(f32::INFINITY, f32::min);
-        let approach = -own.way.dot(manifold.normal);
+        let approach = -own.displacement.dot(manifold.normal);
         let passes = (1.0 - part) * approach - distance > 0.5 * width;
         if !passes {
             return limit;
@@ -120,7 +120,7 @@ pub fn impact([shape_a, shape_b]: [&Shape; 2], [a, b]: [&Mover; 2], slop: f32, l
             if part == 0.0 {
                 part = while_touching(&manifold, &own, width);
             }
-            let total = -b.way.dot(manifold.normal);
+            let total = -b.displacement.dot(manifold.normal);
             let recedes = if total > approach { 1.0 - approach / total } else { 0.0 };
             return limit.min((1.0 - part).mul_add(recedes, part));
         }
@@ -136,7 +136,7 @@ pub fn impact([shape_a, shape_b]: [&Shape; 2], [a, b]: [&Mover; 2], slop: f32, l
 /// The fraction of the step, at least `start`, until which no point of b gets closer than δ along `n`. The
 /// gap along `n` is `gap` at `start` (m). Takes steps of (2) until at most `enough` of the gap is left.
 fn free_until(b: &Mover, shape: &Shape, start: f32, n: Vec2, [gap, enough]: [f32; 2]) -> f32 {
-    let (rises, turn) = (b.way.dot(n), b.turn.abs());
+    let (rises, turn) = (b.displacement.dot(n), b.turn.abs());
     let (mut part, mut lowest_at_start) = (start, None);
     for _ in 0..MOST_STEPS {
         // n in body axes.
@@ -170,13 +170,13 @@ fn while_touching(manifold: &Manifold, b: &Mover, width: f32) -> f32 {
     let n = manifold.normal;
     let (mut part, mut middle) = (1.0_f32, f32::INFINITY);
     for &ManifoldPoint { separation, anchor_b, .. } in manifold.points() {
-        let gets_in = -n.dot(b.way + b.turn * anchor_b.perp());
+        let gets_in = -n.dot(b.displacement + b.turn * anchor_b.perp());
         if gets_in > width + separation.max(-0.5 * width) {
             part = part.min((separation + 0.5 * width).max(0.0) / gets_in);
         }
         middle = middle.min(0.5 * separation - n.dot(anchor_b));
     }
-    let approach = -n.dot(b.way);
+    let approach = -n.dot(b.displacement);
     if approach > middle.max(0.5 * width) {
         part = part.min((middle - 0.5 * width).max(0.0) / approach);
     }
@@ -194,11 +194,11 @@ mod tests {
 
     fn mover(shape: &Shape, x: f32, y: f32, way: [f32; 2], turn: f32) -> Moving<'_> {
         let pose = Pose { position: Vec2::new(x, y), rotation: Vec2::X };
-        Moving(shape, Mover { pose, way: way.into(), turn })
+        Moving(shape, Mover { pose, displacement: way.into(), turn })
     }
 
     fn leaning(shape: &Shape, height: f32, angle: f32, way: Vec2, turn: f32) -> Moving<'_> {
-        Moving(shape, Mover { pose: Pose::new(Vec2::new(0.0, height), angle), way, turn })
+        Moving(shape, Mover { pose: Pose::new(Vec2::new(0.0, height), angle), displacement: way, turn })
     }
 
     fn impact(a: &Moving<'_>, b: &Moving<'_>, limit: f32) -> f32 {

@@ -213,7 +213,7 @@ fn pair(moving: Moving<'_>, rows: &[BodyRow], [a, b]: [u32; 2], limit: f32) -> f
     let [pose_a, pose_b] = moving.bodies.relative_poses(body_a, body_b);
     let mover = |pose: Pose, body: usize| {
         let [x, y, turn, _] = rows[body].delta;
-        Mover { pose, way: Vec2::new(x, y), turn }
+        Mover { pose, displacement: Vec2::new(x, y), turn }
     };
     let shapes = [a, b].map(|shape| &moving.shapes[shape as usize]);
     impact(shapes, [&mover(pose_a, body_a), &mover(pose_b, body_b)], moving.slop, limit)

@@ -72,10 +72,10 @@ impl JointType for Distance {
 
     #[inline(always)]
     fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
-        let (arms, way) = on.anchors();
-        let distance = dot(way, way).sqrt();
+        let (arms, offset) = on.anchors();
+        let distance = dot(offset, offset).sqrt();
         let scale = (distance - L::splat(NO_LINE)).select_positive(L::splat(1.0) / distance, L::zero());
-        let j = Jacobian::along(way.map(|x| x * scale), arms);
+        let j = Jacobian::along(offset.map(|x| x * scale), arms);
         let error = distance - numbers[0];
         if Axial::kept(form) == 0 {
             on.row(j, error, RowLaw::Rigid, kept);
@@ -108,7 +108,7 @@ impl Definition for Distance {
     }
 
     fn measure(&self, at: &Measured) -> JointState {
-        let translation = at.way.length();
+        let translation = at.offset.length();
         let rigid = self.form() == Form::default();
         JointState {
             gap: if rigid { (translation - self.length).abs() } else { 0.0 },

@@ -131,7 +131,7 @@ pub struct JointState {
 #[derive(Clone, Copy, Debug)]
 pub struct Measured {
     /// Vector from a's anchor to b's (m).
-    pub way: DVec2,
+    pub offset: DVec2,
     /// Rotation of a, as a unit vector.
     pub rotation_a: DVec2,
     /// Angle of b relative to a, from the reference angle (rad); it counts full turns.
@@ -341,7 +341,7 @@ pub(crate) fn measured(bodies: &Bodies, ends: [usize; 2], anchors: [[f64; 2]; 2]
         let offset = DVec2::from(anchors[k]) - bodies.local_center[ends[k]].as_dvec2();
         DVec2::from(bodies.center(ends[k])) + pose.rotation.as_dvec2().rotate(offset)
     };
-    Measured { way: anchor(1) - anchor(0), rotation_a: bodies.pose(ends[0]).rotation.as_dvec2(), angle }
+    Measured { offset: anchor(1) - anchor(0), rotation_a: bodies.pose(ends[0]).rotation.as_dvec2(), angle }
 }
 
 /// How far `value` exceeds `limits`.

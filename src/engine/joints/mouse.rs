@@ -60,8 +60,8 @@ impl JointType for Mouse {
     #[inline(always)]
     fn rows<L: Lanes>(_form: Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
         let law = RowLaw::Spring { stiffness: numbers[0], damping: numbers[1], cap: Some(numbers[2]) };
-        let (arms, way) = on.anchors();
-        on.block(Jacobian::point(arms), way, law, kept);
+        let (arms, offset) = on.anchors();
+        on.block(Jacobian::point(arms), offset, law, kept);
     }
 }
 
@@ -82,7 +82,7 @@ impl Definition for Mouse {
     }
 
     fn measure(&self, at: &Measured) -> JointState {
-        JointState { angle: at.angle, translation: at.way.length(), ..JointState::default() }
+        JointState { angle: at.angle, translation: at.offset.length(), ..JointState::default() }
     }
 
     fn load(&self, kept: &[f32]) -> [f64; 2] {

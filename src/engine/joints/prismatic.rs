@@ -63,14 +63,14 @@ const FRAME: usize = 3;
 /// Jacobians of the rows along `axis` and along t = (−axis_y, axis_x), and the displacement in both
 /// directions.
 ///
-/// The axis turns with a, so a's arm reaches to the anchor of b: (r_a + way) × d.
+/// The axis turns with a, so a's arm reaches to the anchor of b: (r_a + offset) × d.
 #[inline(always)]
 pub(super) fn along_and_across<L: Lanes>(numbers: &[L], on: &JointPair<L>) -> ([Jacobian<L>; 2], [L; 2]) {
-    let ([ra, rb], way) = on.anchors();
+    let ([ra, rb], offset) = on.anchors();
     let axis = on.turned(0, [numbers[0], numbers[1]]);
     let across = [-axis[1], axis[0]];
-    let arms = [add(ra, way), rb];
-    ([Jacobian::along(axis, arms), Jacobian::along(across, arms)], [dot(axis, way), dot(across, way)])
+    let arms = [add(ra, offset), rb];
+    ([Jacobian::along(axis, arms), Jacobian::along(across, arms)], [dot(axis, offset), dot(across, offset)])
 }
 
 impl JointType for Prismatic {
@@ -96,9 +96,9 @@ impl JointType for Prismatic {
 
     #[inline(always)]
     fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
-        let ([along, across], [way, off]) = along_and_across(numbers, on);
+        let ([along, across], [translation, off]) = along_and_across(numbers, on);
         let (rigid, kept) = kept.split_at_mut(2);
-        Axial::rows(form, along, way, &numbers[FRAME..], kept, on);
+        Axial::rows(form, along, translation, &numbers[FRAME..], kept, on);
         on.block([across, Jacobian::angle()], [off, numbers[2] + on.turn()], RowLaw::Rigid, rigid);
     }
 }
@@ -125,9 +125,9 @@ impl Definition for Prismatic {
 
     fn measure(&self, at: &Measured) -> JointState {
         let axis = at.rotation_a.rotate(DVec2::from(self.axis).normalize());
-        let translation = axis.dot(at.way);
+        let translation = axis.dot(at.offset);
         JointState {
-            gap: axis.perp_dot(at.way).abs(),
+            gap: axis.perp_dot(at.offset).abs(),
             lean: at.angle.abs(),
             angle: at.angle,
             translation,

@@ -70,8 +70,8 @@ impl JointType for Revolute {
             let angle = numbers[0] + on.turn();
             Axial::rows(form, Jacobian::angle(), angle, &numbers[1..], kept, on);
         }
-        let (arms, way) = on.anchors();
-        on.block(Jacobian::point(arms), way, RowLaw::Rigid, point);
+        let (arms, offset) = on.anchors();
+        on.block(Jacobian::point(arms), offset, RowLaw::Rigid, point);
     }
 }
 
@@ -97,7 +97,7 @@ impl Definition for Revolute {
     fn measure(&self, at: &Measured) -> JointState {
         let angle = at.angle;
         JointState {
-            gap: at.way.length(),
+            gap: at.offset.length(),
             angle,
             excess: excess(self.limits, angle),
             ..JointState::default()

@@ -64,17 +64,17 @@ impl JointType for Weld {
             |at: usize| RowLaw::Spring { stiffness: numbers[at], damping: numbers[at + 1], cap: None };
         let (linear, angular) = (form.spring, form.motor);
         if !linear && !angular {
-            let (arms, way) = on.anchors();
+            let (arms, offset) = on.anchors();
             let [x, y] = Jacobian::point(arms);
-            let error = [way[0], way[1], numbers[0] + on.turn()];
+            let error = [offset[0], offset[1], numbers[0] + on.turn()];
             return on.block([x, y, Jacobian::angle()], error, RowLaw::Rigid, kept);
         }
         let (of_points, of_angle) = kept.split_at_mut(if linear { 4 } else { 2 });
         let law = if angular { spring(if linear { FRAME + 2 } else { FRAME }) } else { RowLaw::Rigid };
         on.row(Jacobian::angle(), numbers[0] + on.turn(), law, of_angle);
-        let (arms, way) = on.anchors();
+        let (arms, offset) = on.anchors();
         let law = if linear { spring(FRAME) } else { RowLaw::Rigid };
-        on.block(Jacobian::point(arms), way, law, of_points);
+        on.block(Jacobian::point(arms), offset, law, of_points);
     }
 }
 
@@ -102,10 +102,10 @@ impl Definition for Weld {
 
     fn measure(&self, at: &Measured) -> JointState {
         JointState {
-            gap: if self.linear.is_some() { 0.0 } else { at.way.length() },
+            gap: if self.linear.is_some() { 0.0 } else { at.offset.length() },
             lean: if self.angular.is_some() { 0.0 } else { at.angle.abs() },
             angle: at.angle,
-            translation: at.way.length(),
+            translation: at.offset.length(),
             ..JointState::default()
         }
     }

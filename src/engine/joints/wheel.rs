@@ -86,11 +86,11 @@ impl JointType for Wheel {
     #[inline(always)]
     fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
         let [suspension, drive] = split(form);
-        let ([along, across], [way, off]) = along_and_across(numbers, on);
+        let ([along, across], [translation, off]) = along_and_across(numbers, on);
         let (rigid, kept) = kept.split_at_mut(1);
         let (of_suspension, of_drive) = kept.split_at_mut(Axial::kept(suspension));
         let (first, second) = numbers[FRAME..].split_at(Axial::numbers(suspension));
-        Axial::rows(suspension, along, way, first, of_suspension, on);
+        Axial::rows(suspension, along, translation, first, of_suspension, on);
         Axial::rows(drive, Jacobian::angle(), L::zero(), second, of_drive, on);
         on.row(across, off, RowLaw::Rigid, rigid);
     }
@@ -114,9 +114,9 @@ impl Definition for Wheel {
 
     fn measure(&self, at: &Measured) -> JointState {
         let axis = at.rotation_a.rotate(DVec2::from(self.axis).normalize());
-        let translation = axis.dot(at.way);
+        let translation = axis.dot(at.offset);
         JointState {
-            gap: axis.perp_dot(at.way).abs(),
+            gap: axis.perp_dot(at.offset).abs(),
             angle: at.angle,
             translation,
             excess: excess(self.limits, translation),

@@ -231,7 +231,7 @@ fn run<L: Lanes, const KIND: usize>(
             let poses = Poses::<L>::gather(poses, bodies);
             let pair = ShapePair::gather(poses, rows, shapes);
             (
-                rectangles::collide(&pair, margins).without_grazes().against_immovable(poses.held[0]),
+                rectangles::collide(&pair, margins).without_grazes().against_immovable(poses.immovable[0]),
                 [L::zero(); 2],
             )
         }),
@@ -249,7 +249,7 @@ fn run<L: Lanes, const KIND: usize>(
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(&poses, hulls, shapes);
                 (
-                    pair.collide(&poses, margins).without_grazes().against_immovable(poses.held[0]),
+                    pair.collide(&poses, margins).without_grazes().against_immovable(poses.immovable[0]),
                     [L::zero(); 2],
                 )
             })
@@ -261,7 +261,7 @@ fn run<L: Lanes, const KIND: usize>(
                 pair.gather(hulls, rows, shapes);
                 let displacements = bodies.map(|body| L::gather_quads::<1, 0>(displacements, body));
                 let (touch, gap, radii) = pair.in_step(&poses, displacements, rolling, margins);
-                (touch.against_immovable(poses.held[0]).with_gap(gap), radii)
+                (touch.against_immovable(poses.immovable[0]).with_gap(gap), radii)
             })
         }
         PairKind::CircleHull => {
@@ -272,7 +272,7 @@ fn run<L: Lanes, const KIND: usize>(
                 let displacements =
                     [bodies[1], bodies[0]].map(|body| L::gather_quads::<1, 0>(displacements, body));
                 let (touch, gap, [hull, circle]) = pair.in_step(&poses, displacements, rolling, margins);
-                (touch.swapped().against_immovable(poses.held[1]).with_gap(gap), [circle, hull])
+                (touch.swapped().against_immovable(poses.immovable[1]).with_gap(gap), [circle, hull])
             })
         }
     }

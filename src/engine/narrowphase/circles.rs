@@ -90,9 +90,9 @@ pub fn in_step<L: Lanes>(
 ) -> (Touch<L>, [L; 2]) {
     let (touch, distance) = with_distance(pair, margins.speculative);
     let displacement = pair.displacement(displacements);
-    let held = pair.poses.held[0];
+    let immovable = pair.poses.immovable[0];
     let gap = passing(&touch, distance, displacement, margins.slop);
-    let touch = touch.against_immovable(held);
+    let touch = touch.against_immovable(immovable);
     let Some(rolling) = rolling else { return (touch.with_gap(gap), [L::zero(); 2]) };
     let gap = rolling.rolls(dot(touch.normal, displacement)).select_positive(touch.separation[0], gap);
     // Coincident centers define no direction to turn.

@@ -105,7 +105,7 @@ pub struct Poses<L> {
     /// Rotations of a and b, (cos, sin).
     pub rotation: [[L; 2]; 2],
     /// 1 if impulses do not move the body (a, b), else 0.
-    pub held: [L; 2],
+    pub immovable: [L; 2],
 }
 
 impl<L: Lanes> Poses<L> {
@@ -119,15 +119,15 @@ impl<L: Lanes> Poses<L> {
             // As `Bodies::relative_poses`: the low parts make it as accurate far from the origin as near it.
             centers: [(q[0] - p[0]) + (q[2] - p[2]), (q[1] - p[1]) + (q[3] - p[3])],
             rotation: [[r[0], r[1]], [s[0], s[1]]],
-            held: [r[2], s[2]],
+            immovable: [r[2], s[2]],
         }
     }
 
     /// The same poses with a and b exchanged.
     #[inline(always)]
     pub fn swapped(self) -> Self {
-        let ([a, b], [held_a, held_b]) = (self.rotation, self.held);
-        Poses { centers: self.centers.map(|x| -x), rotation: [b, a], held: [held_b, held_a] }
+        let ([a, b], [immovable_a, immovable_b]) = (self.rotation, self.immovable);
+        Poses { centers: self.centers.map(|x| -x), rotation: [b, a], immovable: [immovable_b, immovable_a] }
     }
 }
 
@@ -135,7 +135,7 @@ impl Poses<f32> {
     /// Poses of two bodies that impulses move.
     pub fn new(a: &Pose, b: &Pose) -> Self {
         let rotation = [a.rotation.into(), b.rotation.into()];
-        Poses { centers: (b.position - a.position).into(), rotation, held: [0.0; 2] }
+        Poses { centers: (b.position - a.position).into(), rotation, immovable: [0.0; 2] }
     }
 }
 
@@ -216,16 +216,16 @@ impl<L: Lanes> Touch<L> {
         Touch { count: self.passes.select_positive(L::zero(), self.count), ..self }
     }
 
-    /// The same contacts with points on the surface of b if `held` is 1, and midway between both surfaces if
+    /// The same contacts with points on the surface of b if `immovable` is 1, and midway between both surfaces if
     /// it is 0.
     ///
     /// Two moving bodies must share the point, or impulses would change their angular momentum. A body on a
-    /// held one has friction at its own surface: a disc that overlaps the ground by s and slides at v rolls
+    /// immovable one has friction at its own surface: a disc that overlaps the ground by s and slides at v rolls
     /// away at v/(1 + I/(m r a)) with the arm a. That is 2/3 v for a = r, and 2/9 s/r v less for a = r − s/2.
     #[inline(always)]
-    pub fn against_immovable(self, held: L) -> Self {
+    pub fn against_immovable(self, immovable: L) -> Self {
         let [nx, ny] = self.normal;
-        let half = L::splat(0.5) * held;
+        let half = L::splat(0.5) * immovable;
         let moved = |anchors: [[L; 2]; 2]| {
             std::array::from_fn(|p| {
                 let to_surface = half * self.separation[p];

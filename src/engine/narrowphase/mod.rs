@@ -128,27 +128,27 @@ impl Collider {
     ) -> Touch<f32> {
         let [row_a, row_b] = self.rows;
         let poses = Poses::<f32>::new(pose_a, pose_b);
-        let held = f32::from(u8::from(a_is_immovable));
+        let immovable = f32::from(u8::from(a_is_immovable));
         let pair = ShapePair { poses, place: [row_a.place, row_b.place], size: [row_a.size, row_b.size] };
         match self.kind {
-            PairKind::Rectangles => rectangles::collide(&pair, margins).against_immovable(held),
+            PairKind::Rectangles => rectangles::collide(&pair, margins).against_immovable(immovable),
             PairKind::Circles => {
-                let pair = ShapePair { poses: Poses { held: [held, 0.0], ..poses }, ..pair };
+                let pair = ShapePair { poses: Poses { immovable: [immovable, 0.0], ..poses }, ..pair };
                 circles::in_step(&pair, displacements, None, margins).0
             }
             PairKind::Hulls => {
-                Hulls::new(&poses, &self.hulls).collide(&poses, margins).against_immovable(held)
+                Hulls::new(&poses, &self.hulls).collide(&poses, margins).against_immovable(immovable)
             }
             PairKind::HullCircle => {
                 let (touch, gap, _) =
                     HullCircle::new(self.hulls[0], row_b).in_step(&poses, displacements, None, margins);
-                touch.against_immovable(held).with_gap(gap)
+                touch.against_immovable(immovable).with_gap(gap)
             }
             PairKind::CircleHull => {
                 let (pair, poses) = (HullCircle::new(self.hulls[1], row_a), poses.swapped());
                 let (touch, gap, _) =
                     pair.in_step(&poses, [displacements[1], displacements[0]], None, margins);
-                touch.swapped().against_immovable(held).with_gap(gap)
+                touch.swapped().against_immovable(immovable).with_gap(gap)
             }
         }
     }

@@ -26,7 +26,7 @@
 //!
 //! γ is found from the normal equations in `f64`, with at most 5 unknowns. 10⁻⁹ of the trace is added to their diagonal.
 
-use super::{Law, Variant};
+use super::{Guarantee, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::numerics::matrix::solve_in_place;
@@ -51,7 +51,7 @@ pub static SOLVER: Variant = Variant {
             trials: &[1.0, 3.0, 5.0],
         },
     ],
-    breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
+    exceptions: &[(Guarantee::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -28,7 +28,7 @@
 //! with g = J v(λ) + b, and L doubled until (λ⁺ − y)ᵀ K (λ⁺ − y) ≤ L |λ⁺ − y|²_{D⁻¹}. If g·(λ⁺ − λ) > 0, the
 //! momentum is reset.
 
-use super::{Law, Variant};
+use super::{Guarantee, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::records::point_vector::{
@@ -45,9 +45,9 @@ pub static SOLVER: Variant = Variant {
     summary: "accelerated projected gradients on the convex relaxation: lifts off while sliding",
     budget: Budget { substeps: 1, velocity_iterations: 20, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
-    breaks: &[
-        (Law::Converges, "to the convex relaxation, which is another law"),
-        (Law::Rest, "gradients spread a load more slowly than sweeps"),
+    exceptions: &[
+        (Guarantee::Converges, "to the convex relaxation, which is another law"),
+        (Guarantee::Rest, "gradients spread a load more slowly than sweeps"),
     ],
     make: Variant::made_by(|| Box::new(Apgd::default())),
     ..Variant::BASE

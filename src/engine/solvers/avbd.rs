@@ -54,7 +54,7 @@ mod input;
 mod joints;
 mod lanes;
 
-use super::{Law, Uses, Variant};
+use super::{Guarantee, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::types::{BodyStates, ConstraintSet};
 use crate::constraints::numerics::cone;
@@ -100,9 +100,9 @@ pub static SOLVER: Variant = Variant {
         },
     ],
     kept: StateSize { per_point: PER_POINT, per_body: PER_BODY, ..StateSize::NONE },
-    breaks: &[
-        (Law::Momentum, "bodies are moved one at a time and meet only in the limit"),
-        (Law::Converges, "the law that it solves is one of positions"),
+    exceptions: &[
+        (Guarantee::Momentum, "bodies are moved one at a time and meet only in the limit"),
+        (Guarantee::Converges, "the law that it solves is one of positions"),
     ],
     impacts: ImpactLaw::None,
     make: Variant::made_by(|| Box::new(Avbd::default())),

@@ -25,7 +25,7 @@
 //!
 //! See [`spectral`](crate::constraints::vectors::spectral); Π gives the nearest point of the cones.
 
-use super::{Law, Variant};
+use super::{Guarantee, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::vectors::spectral::{Axes, ImpulseProblem, SpectralDescent};
@@ -39,7 +39,7 @@ pub static SOLVER: Variant = Variant {
     summary: "projected gradients of spectral length on the convex relaxation: lifts off while sliding",
     budget: Budget { substeps: 1, velocity_iterations: 20, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
-    breaks: &[(Law::Converges, "to the convex relaxation, which is another law")],
+    exceptions: &[(Guarantee::Converges, "to the convex relaxation, which is another law")],
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

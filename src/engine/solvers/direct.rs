@@ -41,7 +41,7 @@
 
 mod law;
 
-use super::{Law, Variant};
+use super::{Guarantee, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::kernels::velocity::rules::NormalRule;
@@ -88,9 +88,9 @@ pub static SOLVER: Variant = Variant {
             trials: &[],
         },
     ],
-    breaks: &[
-        (Law::NoAllocation, "matrices are as large as the scene"),
-        (Law::Rest, "large scenes have 8 sweeps, too few for tall stacks"),
+    exceptions: &[
+        (Guarantee::NoAllocation, "matrices are as large as the scene"),
+        (Guarantee::Rest, "large scenes have 8 sweeps, too few for tall stacks"),
     ],
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE

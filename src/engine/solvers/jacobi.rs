@@ -19,7 +19,7 @@
 //! for a body in a pile with three contacts or more. A `relaxation` below 2/λ_max prevents that, but slows
 //! down everything else.
 
-use super::{Law, Uses, Variant};
+use super::{Guarantee, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::{Soft, angular_frequencies};
 use crate::constraints::{ImpactLaw, Passes, Solver};
@@ -47,9 +47,9 @@ pub static SOLVER: Variant = Variant {
         Parameter::push_speed(4.0),
     ],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION_OF_STEP, h)),
-    breaks: &[
-        (Law::Converges, "diverges where a body has three contacts or more"),
-        (Law::Rest, "diverges where a body has three contacts or more"),
+    exceptions: &[
+        (Guarantee::Converges, "diverges where a body has three contacts or more"),
+        (Guarantee::Rest, "diverges where a body has three contacts or more"),
     ],
     impacts: ImpactLaw::BOX2D,
     make: Variant::made_by(|| Box::new(Jacobi::default())),

@@ -31,7 +31,7 @@
 
 mod sweep;
 
-use super::{Law, Uses, Variant};
+use super::{Guarantee, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Rigid;
 use crate::constraints::kernels::velocity::sweep::Sweep;
@@ -57,10 +57,10 @@ pub static SOLVER: Variant = Variant {
             trials: &[0.005, 0.02],
         },
     ],
-    breaks: &[
-        (Law::Cone, "a point may take its share of the whole contact's load"),
-        (Law::Converges, "one friction row a contact, which is another law"),
-        (Law::Rest, "10 sweeps are too few for tall stacks and large mass ratios"),
+    exceptions: &[
+        (Guarantee::Cone, "a point may take its share of the whole contact's load"),
+        (Guarantee::Converges, "one friction row a contact, which is another law"),
+        (Guarantee::Rest, "10 sweeps are too few for tall stacks and large mass ratios"),
     ],
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE

@@ -16,7 +16,7 @@
 //!
 //! **Fails when** loads must travel far, which takes sweeps over all contacts.
 
-use super::{Law, Variant};
+use super::{Guarantee, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::{Passes, Schedule, SweepOrder};
@@ -39,7 +39,10 @@ pub static SOLVER: Variant = Variant {
             trials: &[1.0, 2.0, 4.0],
         },
     ],
-    breaks: &[(Law::Rest, "4 sweeps over all contacts are too few for tall stacks and large mass ratios")],
+    exceptions: &[(
+        Guarantee::Rest,
+        "4 sweeps over all contacts are too few for tall stacks and large mass ratios",
+    )],
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

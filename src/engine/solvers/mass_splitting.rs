@@ -25,7 +25,7 @@
 //! (m/n) = m. Neither raises the energy ½ λᵀ K λ + bᵀ λ. Momentum is conserved: copies get Δλ/(m/n) each, and
 //! the body gets the mean, Σ Δλ/m.
 
-use super::{Law, Uses, Variant};
+use super::{Guarantee, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::masses::ScaledMasses;
 use crate::constraints::kernels::velocity::rules::{Soft, angular_frequencies};
@@ -44,9 +44,9 @@ pub static SOLVER: Variant = Variant {
     iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..standard },
     parameters: &[Parameter::CONTACT_HERTZ_OF_STEP, Parameter::PUSH_SPEED],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION_OF_STEP, h)),
-    breaks: &[
-        (Law::Converges, "too slowly to wait for: ten discs by 0.9938 per sweep, springs slower still"),
-        (Law::Rest, "12 slow sweeps are too few for stacks"),
+    exceptions: &[
+        (Guarantee::Converges, "too slowly to wait for: ten discs by 0.9938 per sweep, springs slower still"),
+        (Guarantee::Rest, "12 slow sweeps are too few for stacks"),
     ],
     impacts: ImpactLaw::BOX2D,
     make: Variant::made_by(|| Box::new(MassSplitting::default())),

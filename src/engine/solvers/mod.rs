@@ -124,7 +124,7 @@ pub struct Uses {
 
 /// A property that tests check for every solver, unless its row declares an exception.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Law {
+pub enum Guarantee {
     /// All lane widths give the same bits.
     SameBits,
     /// Impulses act on two bodies with opposite signs.
@@ -201,7 +201,7 @@ pub struct Variant {
     /// Why it does not support joints, if it does not.
     pub joints_unsupported: Option<&'static str>,
     /// Properties that it does not have, with the reason.
-    pub breaks: &'static [(Law, &'static str)],
+    pub exceptions: &'static [(Guarantee, &'static str)],
     /// Creates the solver of a world: its schedule and its state.
     pub make: fn() -> Box<dyn Solver>,
 }
@@ -230,13 +230,12 @@ impl Variant {
         continuous: false,
         kept: StateSize::NONE,
         joints_unsupported: None,
-        breaks: &[],
+        exceptions: &[],
         make: || Schedule::boxed(|_| {}),
     };
 
     /// Wraps [`Self::make`] of the solvers of this crate. A static is compiled together with everything that
-    /// it refers to, used or not. Unit tests create no solver, and without this they took two minutes longer
-    /// to build.
+    /// it refers to, used or not. Unit tests create no solver, and so need not compile any.
     pub(crate) const fn made_by(make: fn() -> Box<dyn Solver>) -> fn() -> Box<dyn Solver> {
         if cfg!(test) { || unreachable!("unit tests make no solver") } else { make }
     }
@@ -288,9 +287,9 @@ impl Variant {
         })
     }
 
-    /// Whether it promises `law`.
-    pub fn promises(&self, law: Law) -> bool {
-        self.breaks.iter().all(|(broken, _)| *broken != law)
+    /// Whether it gives this guarantee.
+    pub fn promises(&self, guarantee: Guarantee) -> bool {
+        self.exceptions.iter().all(|(broken, _)| *broken != guarantee)
     }
 }
 

@@ -24,7 +24,7 @@
 //!
 //! v changes by M⁻¹Jᵀ β p. The next sweep brings λ back within its bounds.
 
-use super::{Law, Variant};
+use super::{Guarantee, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::vectors::conjugate::Conjugate;
@@ -38,7 +38,7 @@ pub static SOLVER: Variant = Variant {
     summary: "conjugate gradients around sweeps",
     budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
-    breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
+    exceptions: &[(Guarantee::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

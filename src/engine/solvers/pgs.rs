@@ -30,7 +30,7 @@
 //! A push can therefore be taken back in a later sweep. Friction clamps its own accumulated impulse to ±µλ.
 //! The accumulated impulses are kept, and the next step starts from them.
 
-use super::{Law, Variant};
+use super::{Guarantee, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::{Passes, Schedule};
@@ -43,7 +43,7 @@ pub static SOLVER: Variant = Variant {
     summary: "sequential impulses with warm starting and Baumgarte stabilization",
     budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
-    breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
+    exceptions: &[(Guarantee::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -15,7 +15,7 @@
 //! **Fails when** there are too few sweeps for the height of a stack, as with [`super::pgs`]. The residual of
 //! the sweeps stays in the velocities, and two position sweeps correct little of the resulting overlap.
 
-use super::{Law, Uses, Variant};
+use super::{Guarantee, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Rigid;
 use crate::constraints::{Passes, PositionSweep, Schedule};
@@ -29,7 +29,7 @@ pub static SOLVER: Variant = Variant {
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 2 },
     uses: Uses { velocity: true, relax: false, position: true },
     parameters: &[Parameter::CORRECTION],
-    breaks: &[(Law::Rest, "4 sweeps are too few for stacks")],
+    exceptions: &[(Guarantee::Rest, "4 sweeps are too few for stacks")],
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

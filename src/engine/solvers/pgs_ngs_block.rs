@@ -15,7 +15,7 @@
 //! **Fails when** loads must travel far: the block couples the two points of a contact, not two contacts, so
 //! convergence over a stack is that of [`super::pgs`].
 
-use super::{Law, Uses, Variant};
+use super::{Guarantee, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Soft;
 use crate::constraints::{Passes, PositionSweep, Schedule};
@@ -29,9 +29,9 @@ pub static SOLVER: Variant = Variant {
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 2 },
     uses: Uses { velocity: true, relax: false, position: true },
     parameters: &[Parameter::CORRECTION],
-    breaks: &[
-        (Law::Cone, "friction rows come first, bounded by the normal impulses before the sweep"),
-        (Law::Rest, "4 sweeps are too few for stacks"),
+    exceptions: &[
+        (Guarantee::Cone, "friction rows come first, bounded by the normal impulses before the sweep"),
+        (Guarantee::Rest, "4 sweeps are too few for stacks"),
     ],
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE

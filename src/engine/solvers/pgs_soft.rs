@@ -14,7 +14,7 @@
 //! **Fails when** stacks are tall: the sweeps of one step do not carry a load through them. At a third of the
 //! step rate, a spring is only as stiff as 20 Hz.
 
-use super::{Law, Uses, Variant};
+use super::{Guarantee, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
 use crate::constraints::{ImpactLaw, Passes, Schedule};
@@ -30,7 +30,7 @@ pub static SOLVER: Variant = Variant {
     iterations: |standard, k| Budget { substeps: 1, velocity_iterations: k, relax_iterations: k, ..standard },
     parameters: &[Parameter::CONTACT_HERTZ_OF_STEP, Parameter::push_speed(2.0)],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION_OF_STEP, h)),
-    breaks: &[(Law::Rest, "6 sweeps without substeps are too few for stacks")],
+    exceptions: &[(Guarantee::Rest, "6 sweeps without substeps are too few for stacks")],
     impacts: ImpactLaw::BOX2D,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE

@@ -31,7 +31,7 @@
 //! s is the current separation (overlap counts as zero in velocity iterations), and d the distance from the
 //! anchor.
 
-use super::{Law, Uses, Variant};
+use super::{Guarantee, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Soft;
 use crate::constraints::kernels::velocity::sticky::{Patch, Sticky};
@@ -61,10 +61,10 @@ pub static SOLVER: Variant = Variant {
         Parameter::push_speed(1e3),
     ],
     kept: StateSize { per_point: 1, ..StateSize::NONE },
-    breaks: &[
-        (Law::Cone, "a point may take its share of the whole contact's load"),
-        (Law::Converges, "friction holds positions, which is another law"),
-        (Law::Rest, "no warm start"),
+    exceptions: &[
+        (Guarantee::Cone, "a point may take its share of the whole contact's load"),
+        (Guarantee::Converges, "friction holds positions, which is another law"),
+        (Guarantee::Rest, "no warm start"),
     ],
     make: Variant::made_by(|| Box::new(PhysX::default())),
     ..Variant::BASE
@@ -116,7 +116,7 @@ impl Solver for PhysX {
         // Bounces were found at the start of the step.
         passes.bounce(budget.substeps - 1);
         // Impulses accumulate over the whole step, because none is applied twice.
-        passes.book_impulses();
-        self.drifts.book(passes, reach);
+        passes.record_impulses();
+        self.drifts.store(passes, reach);
     }
 }

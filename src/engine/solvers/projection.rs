@@ -15,7 +15,7 @@
 //! **Fails when** anything should slide, roll or lean: there is no friction. Without warm starting, every
 //! step starts from zero impulses, so tall stacks sink and spread.
 
-use super::{Law, Uses, Variant};
+use super::{Guarantee, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Touching;
 use crate::constraints::{ImpactLaw, Passes, PositionSweep, Schedule};
@@ -28,7 +28,7 @@ pub static SOLVER: Variant = Variant {
     summary: "pushes positions apart, then removes approach velocities; no warm starting, no friction",
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 4 },
     uses: Uses { velocity: true, relax: false, position: true },
-    breaks: &[(Law::Rest, "no friction and no warm starting")],
+    exceptions: &[(Guarantee::Rest, "no friction and no warm starting")],
     impacts: ImpactLaw::None,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE

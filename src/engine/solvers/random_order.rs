@@ -16,7 +16,7 @@
 //!
 //! **Fails when** [`super::pgs`] does: changes travel no further per sweep.
 
-use super::{Law, Variant};
+use super::{Guarantee, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::{Passes, Schedule, SweepOrder};
@@ -39,7 +39,7 @@ pub static SOLVER: Variant = Variant {
             trials: &[],
         },
     ],
-    breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
+    exceptions: &[(Guarantee::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

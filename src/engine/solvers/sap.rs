@@ -31,7 +31,7 @@
 #[doc(hidden)]
 pub mod convex;
 
-use super::{Law, Variant};
+use super::{Guarantee, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::{ImpactLaw, Passes, Schedule};
@@ -71,9 +71,9 @@ pub static SOLVER: Variant = Variant {
             trials: &[],
         },
     ],
-    breaks: &[
-        (Law::Converges, "to the convex relaxation with soft contacts, which is another law"),
-        (Law::NoAllocation, "matrices are as large as the scene"),
+    exceptions: &[
+        (Guarantee::Converges, "to the convex relaxation with soft contacts, which is another law"),
+        (Guarantee::NoAllocation, "matrices are as large as the scene"),
     ],
     impacts: ImpactLaw::None,
     make: Variant::made_by(|| Schedule::boxed(step)),

@@ -30,7 +30,7 @@ mod frames;
 mod jams;
 mod rest;
 
-use super::{Law, Uses, Variant};
+use super::{Guarantee, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::impacts::spread::VISITS;
 use crate::constraints::joints::chains::{ChainStage, Chains};
@@ -78,7 +78,7 @@ pub static SOLVER: Variant = Variant {
         },
     ],
     mechanisms: &MECHANISMS,
-    breaks: &[(Law::Converges, "preload is part of its law, and comes from the steps before")],
+    exceptions: &[(Guarantee::Converges, "preload is part of its law, and comes from the steps before")],
     kept: StateSize { per_contact: PER_CONTACT, ..StateSize::NONE },
     impacts: ImpactLaw::Solver { per_contact: 0, per_point: 0 },
     continuous: true,

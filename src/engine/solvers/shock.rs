@@ -21,7 +21,7 @@
 //! on the bodies below, so momentum is lost. Loads appear too light from below, levers tip the wrong way, and
 //! swinging bodies are damped.
 
-use super::{Law, Variant};
+use super::{Guarantee, Variant};
 use crate::bodies::Bodies;
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::masses::ScaledMasses;
@@ -38,10 +38,10 @@ pub static SOLVER: Variant = Variant {
     summary: "sequential impulses, then a sweep from the ground up over immovable bodies",
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
-    breaks: &[
-        (Law::Momentum, "in the last sweep bodies below do not answer"),
-        (Law::Converges, "the last sweep solves another problem"),
-        (Law::Rest, "stack:10 creeps at 25 mm/s: a lower body does not react when its load leans"),
+    exceptions: &[
+        (Guarantee::Momentum, "in the last sweep bodies below do not answer"),
+        (Guarantee::Converges, "the last sweep solves another problem"),
+        (Guarantee::Rest, "stack:10 creeps at 25 mm/s: a lower body does not react when its load leans"),
     ],
     make: Variant::made_by(|| Box::new(Shock::default())),
     ..Variant::BASE

@@ -14,7 +14,7 @@
 //! point of a box is half of the first), and from ω = 2 on nothing converges. With few sweeps, a large ω
 //! leaves larger errors than no over-relaxation.
 
-use super::{Law, Variant};
+use super::{Guarantee, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::{Passes, Schedule};
@@ -37,7 +37,7 @@ pub static SOLVER: Variant = Variant {
             trials: &[1.0, 1.2, 1.4, 1.6],
         },
     ],
-    breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
+    exceptions: &[(Guarantee::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

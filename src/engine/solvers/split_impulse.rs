@@ -16,7 +16,7 @@
 //! **Fails when** [`super::pgs`] does, except that it does not throw overlapping bodies apart. The residual
 //! of the velocity sweeps stays in the velocities, and pseudo-velocities start at zero in each step.
 
-use super::{Law, Uses, Variant};
+use super::{Guarantee, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::{Rigid, Soft};
 use crate::constraints::{Passes, Solver};
@@ -34,7 +34,7 @@ pub static SOLVER: Variant = Variant {
         meaning: "share of the overlap that pseudo-velocities remove per step",
         ..Parameter::CORRECTION
     }],
-    breaks: &[(Law::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
+    exceptions: &[(Guarantee::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
     make: Variant::made_by(|| Box::new(SplitImpulse::default())),
     ..Variant::BASE
 };

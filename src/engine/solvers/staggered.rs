@@ -29,7 +29,7 @@
 //!
 //! [`spectral`]: crate::constraints::vectors::spectral
 
-use super::{Law, Variant};
+use super::{Guarantee, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::kernels::velocity::sweep::Sweep;
@@ -56,8 +56,8 @@ pub static SOLVER: Variant = Variant {
             trials: &[5.0, 20.0],
         },
     ],
-    breaks: &[(
-        Law::Converges,
+    exceptions: &[(
+        Guarantee::Converges,
         "to the law of `pgs` where rounds settle, but roundings grow in its inner iterations",
     )],
     make: Variant::made_by(|| Schedule::boxed(step)),

@@ -16,7 +16,7 @@
 //! its size per iteration, and to 0.976 per plain sweep: no gain per sweep. In colored order, changes travel
 //! one contact per sweep in either direction.
 
-use super::{Law, Variant};
+use super::{Guarantee, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::{Passes, Schedule, SweepOrder};
@@ -29,7 +29,7 @@ pub static SOLVER: Variant = Variant {
     summary: "sequential impulses, forward and back again",
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
-    breaks: &[(Law::Rest, "8 sweeps in 4 pairs are too few for tall stacks and large mass ratios")],
+    exceptions: &[(Guarantee::Rest, "8 sweeps in 4 pairs are too few for tall stacks and large mass ratios")],
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -15,7 +15,7 @@
 //! **Fails when** the budget is small: contacts are rigid and there is no relaxing sweep, so the residual of
 //! a sweep stays in the velocities and stacks jitter.
 
-use super::{Law, Uses, Variant};
+use super::{Guarantee, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Rigid;
 use crate::constraints::{ImpactLaw, Passes, PositionSweep, Schedule};
@@ -29,7 +29,7 @@ pub static SOLVER: Variant = Variant {
     budget: Budget { substeps: 4, velocity_iterations: 1, relax_iterations: 0, position_iterations: 1 },
     uses: Uses { velocity: true, relax: false, position: true },
     parameters: &[Parameter::CORRECTION],
-    breaks: &[(Law::Rest, "jitters at its standard budget")],
+    exceptions: &[(Guarantee::Rest, "jitters at its standard budget")],
     impacts: ImpactLaw::BOX2D,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE

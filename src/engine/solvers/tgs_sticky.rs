@@ -17,7 +17,7 @@
 //! **Fails when** stacks are tall: there is no warm start, so each step begins cold, and in every substep 0.8
 //! of an overlap is pushed out through velocities.
 
-use super::{Law, Uses, Variant};
+use super::{Guarantee, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::sticky::Sticky;
 use crate::constraints::records::kept::StateSize;
@@ -53,10 +53,10 @@ pub static SOLVER: Variant = Variant {
         Parameter::push_speed(4.0),
     ],
     kept: StateSize { per_point: 1, ..StateSize::NONE },
-    breaks: &[
-        (Law::Cone, "a point may take its share of the whole manifold's load"),
-        (Law::Converges, "friction holds positions, which is another law"),
-        (Law::Rest, "no warm start"),
+    exceptions: &[
+        (Guarantee::Cone, "a point may take its share of the whole manifold's load"),
+        (Guarantee::Converges, "friction holds positions, which is another law"),
+        (Guarantee::Rest, "no warm start"),
     ],
     impacts: ImpactLaw::BOX2D,
     make: Variant::made_by(|| Box::new(TgsSticky::default())),
@@ -97,7 +97,7 @@ impl Solver for TgsSticky {
             passes.bounce(substep);
         }
         // Impulses accumulate over the whole step, because none is applied twice.
-        passes.book_impulses();
-        self.drifts.book(passes, reach);
+        passes.record_impulses();
+        self.drifts.store(passes, reach);
     }
 }

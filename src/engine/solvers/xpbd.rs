@@ -21,7 +21,7 @@
 
 mod displace;
 
-use super::{Law, Uses, Variant};
+use super::{Guarantee, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::{ImpactLaw, Passes, PointVector, Solver, Workspace};
 use crate::lanes::BodyRow;
@@ -47,11 +47,11 @@ pub static SOLVER: Variant = Variant {
             trials: &[],
         },
     ],
-    breaks: &[
-        (Law::Cone, "friction of positions and of velocities have a cone each"),
-        (Law::Momentum, "corrections of velocities are in no impulse that it reports"),
-        (Law::Converges, "the law that it solves is one of positions"),
-        (Law::Rest, "no warm start"),
+    exceptions: &[
+        (Guarantee::Cone, "friction of positions and of velocities have a cone each"),
+        (Guarantee::Momentum, "corrections of velocities are in no impulse that it reports"),
+        (Guarantee::Converges, "the law that it solves is one of positions"),
+        (Guarantee::Rest, "no warm start"),
     ],
     impacts: ImpactLaw::Solver { per_contact: 0, per_point: 2 },
     make: Variant::made_by(|| Box::new(Xpbd::default())),

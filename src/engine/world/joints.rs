@@ -167,7 +167,7 @@ impl World {
     pub fn joint_impulses(&self, handle: JointHandle) -> Result<Option<RecordedImpulses>, Error> {
         self.joint(handle)?;
         let place = self.joints.places[handle.index()];
-        Ok(place.and_then(|[group, i]| self.work.types[group as usize].kind.booked(i as usize)))
+        Ok(place.and_then(|[group, i]| self.work.types[group as usize].kind.recorded(i as usize)))
     }
 
     /// Blocks of all joints in the next step, as if it were a single step of `h` (s) without substeps, with
@@ -224,7 +224,7 @@ impl World {
                 last.clear();
                 step.clear();
                 kind.collect(i, on, &mut last);
-                kind.collect_booked(i, on, &mut step);
+                kind.collect_recorded(i, on, &mut step);
                 let joint = names.get(i).copied().flatten();
                 solved.extend(last.iter().zip(&step).map(|(&block, step): (&RowBlock, &RowBlock)| {
                     SolvedBlock { joint, block, step_impulses: step.impulses }

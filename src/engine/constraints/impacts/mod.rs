@@ -118,5 +118,3 @@ pub struct ImpactRecords {
     /// Impacts before the step.
     pub(crate) spread: spread::ImpactPropagation,
 }
-
-impl ImpactRecords {}

@@ -49,7 +49,7 @@ pub trait JointType: Clone + fmt::Debug + Send + 'static {
     fn rows<L: Lanes>(form: Self::Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>);
 }
 
-/// How many numbers every record begins with. They are `[r_a, r_b, way]` (m) at the start of the step: the
+/// How many numbers every record begins with. They are `[r_a, r_b, offset]` (m) at the start of the step: the
 /// arms from the centers of mass to the anchors, and the vector from a's anchor to b's.
 pub const ANCHORS: usize = 6;
 
@@ -101,7 +101,7 @@ pub struct Joints<T: JointType> {
     /// Angles (rad); see [`JointSetup::angle`]. `[joints]`
     angles: Vec<f32>,
     /// Impulses of the step; empty unless they are recorded. `[joints]`
-    booked: Vec<RecordedImpulses>,
+    recorded: Vec<RecordedImpulses>,
     /// Sums of `kept` over the substeps of the step; empty unless they are recorded. `[joints × kept]`
     summed: Vec<f32>,
     /// Substep to which the impulses belong (s).
@@ -118,7 +118,7 @@ impl<T: JointType> Joints<T> {
     /// of added joints belong (s).
     pub fn new(form: T::Form, swapped: bool, h: f32) -> Self {
         let (joints, ends, anchors, numbers, kept, angles) = (vec![], vec![], vec![], vec![], vec![], vec![]);
-        let (booked, summed, rigid) = (vec![], vec![], Self::rigid_block(form));
+        let (recorded, summed, rigid) = (vec![], vec![], Self::rigid_block(form));
         let linked = Linked::default();
         Joints {
             joints,
@@ -129,7 +129,7 @@ impl<T: JointType> Joints<T> {
             numbers,
             kept,
             angles,
-            booked,
+            recorded,
             summed,
             h,
             linked,
@@ -186,7 +186,7 @@ impl<T: JointType> Joints<T> {
 
     /// Adds up λ, and Jᵀ λ of each joint: the velocities that a warm start gives to resting bodies of unit
     /// mass and inertia.
-    fn book<L: Lanes>(&mut self, on: TypeInput<'_>) {
+    fn record<L: Lanes>(&mut self, on: TypeInput<'_>) {
         let (first_kept, stride, rows) = (self.first_kept(), self.stride(), &on.rows);
         on.batches.for_each_record::<L>(stride, |at| {
             let at = at.with_ends(self.swapped);
@@ -208,8 +208,8 @@ impl<T: JointType> Joints<T> {
                 let mut pass = JointWarmStart { pair: JointPair::new(bodies, anchors), driving };
                 rows_once::<T, L>(self.form, numbers, kept, &mut pass);
                 for (lane, &joint) in joints.iter().enumerate() {
-                    let booked = &mut self.booked[joint as usize];
-                    let sums = if driving { &mut booked.driving } else { &mut booked.all };
+                    let recorded = &mut self.recorded[joint as usize];
+                    let sums = if driving { &mut recorded.driving } else { &mut recorded.all };
                     for (sum, body) in sums.iter_mut().zip(&pass.pair.bodies) {
                         for (sum, k) in sum.iter_mut().zip([VX, VY, W]) {
                             *sum += bytemuck::cast_slice::<L, f32>(&body[k..=k])[lane];
@@ -312,13 +312,13 @@ impl<T: JointType> Joints<T> {
         (JointPair::new(bodies, &anchors), names)
     }
 
-    /// States the rows of one joint, in one lane, to a pass over `blocks`. `booked`: with the impulses of the
+    /// States the rows of one joint, in one lane, to a pass over `blocks`. `recorded`: with the impulses of the
     /// whole step.
-    fn state(&mut self, joint: usize, on: BodyStates<'_>, blocks: Blocks<'_>, booked: bool) {
+    fn state(&mut self, joint: usize, on: BodyStates<'_>, blocks: Blocks<'_>, recorded: bool) {
         let (pair, names) = self.pair(joint, on);
         let (numbers, kept) = (T::numbers(self.form), T::kept(self.form));
         let numbers = &self.numbers[joint * numbers..][..numbers];
-        let kept = &mut if booked { &mut self.summed } else { &mut self.kept }[joint * kept..][..kept];
+        let kept = &mut if recorded { &mut self.summed } else { &mut self.kept }[joint * kept..][..kept];
         rows_once::<T, f32>(self.form, numbers, kept, &mut Collected { pair, names, blocks });
     }
 }
@@ -422,8 +422,8 @@ fn placed_anchors<L: Lanes>(
     };
     let (ra, rb) = (turned(a, [local_ax, local_ay]), turned(b, [local_bx, local_by]));
     let (from, to) = (L::gather_quads::<2, 0>(poses, a), L::gather_quads::<2, 0>(poses, b));
-    let way = [0, 1].map(|k| ((to[k] - from[k]) + (to[2 + k] - from[2 + k])) + (rb[k] - ra[k]));
-    [ra[0], ra[1], rb[0], rb[1], way[0], way[1]]
+    let offset = [0, 1].map(|k| ((to[k] - from[k]) + (to[2 + k] - from[2 + k])) + (rb[k] - ra[k]));
+    [ra[0], ra[1], rb[0], rb[1], offset[0], offset[1]]
 }
 
 /// [`JointType::rows`] where speed does not matter: compiled once.
@@ -451,7 +451,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
     }
 
     fn begin(&mut self, bodies: &Bodies, h: f32) {
-        self.booked.clear();
+        self.recorded.clear();
         self.summed.clear();
         if self.h != h {
             // Scales the impulses, so that the forces stay the same.
@@ -479,10 +479,10 @@ impl<T: JointType> ConstraintType for Joints<T> {
             (_, PassMode::Vector(of)) => at_width!(width, Self::vector_pass(self, of, on)),
             (_, PassMode::LoadDirectImpulses) => at_width!(width, Self::load_direct_impulses(self, on)),
             (_, PassMode::Forget) => at_width!(width, JointNumbers::forget(self.all(), on)),
-            (_, PassMode::Book) => {
-                self.booked.resize(self.joints.len(), RecordedImpulses::default());
+            (_, PassMode::Record) => {
+                self.recorded.resize(self.joints.len(), RecordedImpulses::default());
                 self.summed.resize(self.kept.len(), 0.0);
-                at_width!(width, Self::book(self, on));
+                at_width!(width, Self::record(self, on));
             }
             (Phase::Prepare, _) => at_width!(width, JointNumbers::fill(self.all(), on)),
             (Phase::Store, _) => at_width!(width, JointNumbers::store(self.all(), on)),
@@ -520,7 +520,7 @@ impl<T: JointType> ConstraintType for Joints<T> {
         self.state(constraint, on, Blocks::From(blocks.iter()), false);
     }
 
-    fn collect_booked(&mut self, constraint: usize, on: BodyStates<'_>, to: &mut Vec<RowBlock>) {
+    fn collect_recorded(&mut self, constraint: usize, on: BodyStates<'_>, to: &mut Vec<RowBlock>) {
         self.summed.resize(self.kept.len(), 0.0);
         self.state(constraint, on, Blocks::To(to), true);
     }
@@ -550,8 +550,8 @@ impl<T: JointType> ConstraintType for Joints<T> {
         &self.kept[constraint * kept..][..kept]
     }
 
-    fn booked(&self, constraint: usize) -> Option<RecordedImpulses> {
-        self.booked.get(constraint).copied()
+    fn recorded(&self, constraint: usize) -> Option<RecordedImpulses> {
+        self.recorded.get(constraint).copied()
     }
 
     fn angle(&self, constraint: usize) -> f32 {

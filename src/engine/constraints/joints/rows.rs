@@ -156,11 +156,11 @@ impl<L: Lanes> JointPair<L> {
         let start = [[record[0], record[1]], [record[2], record[3]]];
         let moved = [self.turn_of(0, start[0]), self.turn_of(1, start[1])];
         let [a, b] = &self.bodies;
-        let way = [
+        let offset = [
             (record[4] + (b[DX] - a[DX])) + (moved[1][0] - moved[0][0]),
             (record[5] + (b[DY] - a[DY])) + (moved[1][1] - moved[0][1]),
         ];
-        ([add(start[0], moved[0]), add(start[1], moved[1])], way)
+        ([add(start[0], moved[0]), add(start[1], moved[1])], offset)
     }
 
     /// J x, where x are the velocities or the displacements at these places of the body rows.

@@ -56,7 +56,7 @@ pub enum PassMode {
     /// Only springs and motors act.
     Drive,
     /// Accumulated impulses are added to the totals of the step, for metrics.
-    Book,
+    Record,
     /// Records take up the impulses of rigid rows that sweeps leave alone.
     LoadDirectImpulses,
     /// No warm starting: accumulated impulses are set to zero, and nothing else happens.

@@ -4,21 +4,8 @@
 //! needs more registers than there are, and its chain of a hundred dependent instructions fills the
 //! out-of-order window. If several batches go through a stage together, the stage needs fewer registers, and
 //! its short chain overlaps with that of the next batch. So at four and at eight lanes, eight batches are
-//! processed together. Change in sweep time:
-//!
-//! ```text
-//! large_pyramid          8 lanes, 16 registers   8 lanes, 32   4 lanes, 32   16 lanes, 32: by 2, by 4
-//! soft_step   soft              −12 %                −7 %         −11 %            +1      −1 %
-//!             relaxing          −12 %                −8 %          −9 %            +1       0 %
-//! shim        soft              −13 %                −4 %          −6 %            +4      −2 %
-//!             relaxing           −1 %                −2 %          −1 %           +11      +5 %
-//! ```
-//!
-//! At sixteen lanes batches are processed one by one. So are segments of fewer than eight batches, whose
-//! sweeps take 0 to 8 % longer than before stages were introduced (`pyramid:10`, `stack:20`). Other group
-//! sizes, with 16 registers and eight lanes (`soft_step`, four stages): 2, 4, 8 and 16 batches gained 1, 3, 4
-//! and 3 %. Four stages cost 4 % more than three if gathering is separated from forming rows, and 4 and 6 %
-//! more if positions are separated from velocities.
+//! processed together. At sixteen lanes batches are processed one by one, and so are segments of fewer than eight
+//! batches. Gathering and forming rows are one stage: separate ones would store and load the bodies once more.
 
 use crate::constraints::kernels::frame::{BodyPair, INV_INERTIA, INV_MASS, VX, VY, W, apply, to_frame};
 use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};

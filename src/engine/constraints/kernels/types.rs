@@ -199,14 +199,14 @@ pub trait ConstraintType: Any + fmt::Debug + Send {
         &[]
     }
 
-    /// Impulses of a constraint in the last step, if they were recorded ([`PassMode::Book`]).
-    fn booked(&self, _constraint: usize) -> Option<RecordedImpulses> {
+    /// Impulses of a constraint in the last step, if they were recorded ([`PassMode::Record`]).
+    fn recorded(&self, _constraint: usize) -> Option<RecordedImpulses> {
         None
     }
 
     /// As [`Self::collect`], with the impulses of the whole last step if they were recorded
-    /// ([`PassMode::Book`]), otherwise zeros.
-    fn collect_booked(&mut self, _constraint: usize, _on: BodyStates<'_>, _to: &mut Vec<RowBlock>) {}
+    /// ([`PassMode::Record`]), otherwise zeros.
+    fn collect_recorded(&mut self, _constraint: usize, _on: BodyStates<'_>, _to: &mut Vec<RowBlock>) {}
 
     /// Relative angle of a constraint's bodies, counted across full turns (rad).
     fn angle(&self, _constraint: usize) -> f32 {

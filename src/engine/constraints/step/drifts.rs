@@ -3,7 +3,7 @@
 
 use super::{Passes, StepParts, Workspace};
 use crate::clock::Phase;
-use crate::constraints::kernels::velocity::sticky::{BookDrift, LoadDrift, Sticky, StickySweep};
+use crate::constraints::kernels::velocity::sticky::{LoadDrift, Sticky, StickySweep, StoreDrift};
 use crate::constraints::kernels::velocity::sweep::ContactLaw;
 use crate::constraints::records::point_vector::PointVector;
 
@@ -40,10 +40,10 @@ impl Drifts {
     }
 
     /// Keeps the drifts at the end of a step, of points within `reach` (m).
-    pub fn book(&mut self, passes: &mut Passes<'_>, reach: f32) {
+    pub fn store(&mut self, passes: &mut Passes<'_>, reach: f32) {
         if passes.rows_per_point() == 2 {
             let drifts = passes.parts_of(&mut self.vector);
-            passes.run(Phase::Store, &mut BookDrift { reach, drifts });
+            passes.run(Phase::Store, &mut StoreDrift { reach, drifts });
         }
     }
 }

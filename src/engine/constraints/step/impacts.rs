@@ -147,7 +147,7 @@ impl Passes<'_> {
     /// Ends substep `substep`: bounces if it is the last, and books impulses if they are recorded.
     pub fn end_substep(&mut self, substep: u32) {
         self.bounce(substep);
-        self.book_impulses();
+        self.record_impulses();
     }
 
     /// The first part of [`Self::end_substep`].
@@ -168,9 +168,9 @@ impl Passes<'_> {
     }
 
     /// The second part of [`Self::end_substep`]: adds the accumulated impulses to those of the step.
-    pub fn book_impulses(&mut self) {
+    pub fn record_impulses(&mut self) {
         if self.input.record_impulses {
-            self.over_types_alone(Phase::Store, PassMode::Book);
+            self.over_types_alone(Phase::Store, PassMode::Record);
             let Workspace { lanes, serial, .. } = &mut *self.work;
             for batches in [lanes, serial] {
                 let width = batches.width();

@@ -41,7 +41,7 @@ impl Passes<'_> {
     pub fn restart_joints(&mut self) {
         if !self.work.types.is_empty() {
             if self.input.record_impulses {
-                self.over_types_alone(Phase::Store, PassMode::Book);
+                self.over_types_alone(Phase::Store, PassMode::Record);
             }
             self.over_types_alone(Phase::Prepare, PassMode::Forget);
             self.clock.lap(Phase::Solve);

@@ -84,7 +84,7 @@ pub(crate) struct LoadDrift<'a> {
 }
 
 /// Stores the drifts at the end of the step in [`SolverState`]; see the [module](self).
-pub(crate) struct BookDrift<'a> {
+pub(crate) struct StoreDrift<'a> {
     /// As in [`Sticky`].
     pub reach: f32,
     /// As in [`StickySweep`].
@@ -108,10 +108,10 @@ impl Pass for LoadDrift<'_> {
     }
 }
 
-impl Pass for BookDrift<'_> {
+impl Pass for StoreDrift<'_> {
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
-        over_segments!(book, L, F; on.rows, on.batches, on.kept, self.drifts[on.part as usize], self.reach);
+        over_segments!(store, L, F; on.rows, on.batches, on.kept, self.drifts[on.part as usize], self.reach);
     }
 }
 
@@ -267,7 +267,7 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Partner>(
 }
 
 #[inline(always)]
-fn book<L: Lanes, N: KernelFeatures, O: Partner>(
+fn store<L: Lanes, N: KernelFeatures, O: Partner>(
     rows: &mut [BodyRow],
     batches: &mut Batches,
     segment: &Segment,
