@@ -117,23 +117,20 @@ impl<T: JointType> Joints<T> {
     /// No joints yet. `swapped`: b is the body that impulses do not move. `h`: substep to which the impulses
     /// of added joints belong (s).
     pub fn new(form: T::Form, swapped: bool, h: f32) -> Self {
-        let (joints, ends, anchors, numbers, kept, angles) = (vec![], vec![], vec![], vec![], vec![], vec![]);
-        let (recorded, summed, rigid) = (vec![], vec![], Self::rigid_block(form));
-        let linked = Linked::default();
         Joints {
-            joints,
+            joints: vec![],
             form,
             swapped,
-            ends,
-            anchors,
-            numbers,
-            kept,
-            angles,
-            recorded,
-            summed,
+            ends: vec![],
+            anchors: vec![],
+            numbers: vec![],
+            kept: vec![],
+            angles: vec![],
+            recorded: vec![],
+            summed: vec![],
             h,
-            linked,
-            rigid,
+            linked: Linked::default(),
+            rigid: Self::rigid_block(form),
         }
     }
 

@@ -64,17 +64,18 @@ struct MovingBody {
 }
 
 /// Bound on γ.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 enum ImpulseBound {
     /// |γ_t| ≤ µ γ_n; R is diagonal.
     Cone(f64),
+    #[default]
     Free,
     NotNegative,
     Norm(f64),
 }
 
 /// Up to three rows with one bound.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct ConvexBlock {
     bodies: [usize; 2],
     size: usize,
@@ -323,19 +324,7 @@ impl Convex {
                 }
             }
         }
-        let zero = [[0.0; 3]; 3];
-        ConvexBlock {
-            bodies: moving,
-            size,
-            jacobian,
-            target,
-            softness: zero,
-            inverse: zero,
-            bound,
-            error: [0.0; 3],
-            impulse: [0.0; 3],
-            stiffness: zero,
-        }
+        ConvexBlock { bodies: moving, size, jacobian, target, bound, ..ConvexBlock::default() }
     }
 
     /// The block of a joint. R is K/D for a spring and a small multiple of K for a rigid row.
@@ -604,19 +593,8 @@ mod tests {
             (ImpulseBound::Norm(0.7), 3, softness),
         ];
         for (bound, size, softness) in bounds {
-            let zero = [[0.0; 3]; 3];
-            let block = ConvexBlock {
-                bodies: [FIXED; 2],
-                size,
-                jacobian: [zero; 2],
-                target: [0.0; 3],
-                softness,
-                inverse: inverse(&softness, size),
-                bound,
-                error: [0.0; 3],
-                impulse: [0.0; 3],
-                stiffness: zero,
-            };
+            let inverse = inverse(&softness, size);
+            let block = ConvexBlock { size, softness, inverse, bound, ..ConvexBlock::default() };
             // None of these is the apex of a cone, which has no derivative.
             let errors: Vec<[f64; 3]> = (1..60)
                 .map(|i| {
