@@ -222,37 +222,13 @@ fn rests(lab: &Lab, masses: [f64; 2]) -> Result<(f64, bool), Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::contacts::Manifold;
     use crate::engine::solvers;
-    use glam::Vec2;
-
-    fn world(scene: &str) -> World {
-        let lab = Lab::new(solvers::find("pgs").unwrap());
-        lab.world(lab.scene(scene).unwrap()).unwrap()
-    }
-
-    #[test]
-    fn loads_are_those_of_what_is_above() {
-        let mut world = world("disc_column:2");
-        let contact = |body_a, body_b, newtons: f32| Contact {
-            body_a,
-            body_b,
-            manifold: Manifold { normal: Vec2::Y, count: 1, ..Default::default() },
-            step_impulse: [[newtons / 60.0, 0.0], [0.0; 2]],
-            ..Default::default()
-        };
-        world.contacts = vec![contact(0, 1, 20.0), contact(1, 2, 10.0)];
-        assert!(load_error(&world, 2) < 1e-5);
-        world.contacts[1] = contact(1, 2, 13.0);
-        assert!((load_error(&world, 2) - 3.0).abs() < 1e-5);
-        world.contacts.pop();
-        assert!((load_error(&world, 2) - 10.0).abs() < 1e-5);
-    }
 
     #[test]
     fn a_column_stands_until_it_sinks_or_falls() {
+        let lab = Lab::new(solvers::find("pgs").unwrap());
         let stands_at = |i: usize, [x, y]: [f32; 2]| {
-            let mut world = world("stack:3");
+            let mut world = lab.world(lab.scene("stack:3").unwrap()).unwrap();
             (world.bodies.position_x[i], world.bodies.position_y[i]) = (x, y);
             stands(&world, 3)
         };
