@@ -9,8 +9,6 @@ use serde::{Deserialize, Serialize};
 pub const ROWS: usize = 3;
 /// One number per row of a block; zero for absent rows.
 pub type RowVector = [f64; ROWS];
-/// Damping (1) below which the impulse of a spring follows from its error alone, whatever its velocity.
-pub(super) const UNDAMPED: f64 = 1e-12;
 
 /// A joint of a problem.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -134,33 +132,6 @@ impl ProblemJoint {
     }
 }
 
-/// Bounds of the impulses of a block.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum BlockBound {
-    None,
-    /// λ ≥ 0
-    Positive,
-    /// Largest norm.
-    Cap(f64),
-}
-
-impl BlockBound {
-    /// Π; NaN stays NaN.
-    pub fn project(self, mut y: RowVector) -> RowVector {
-        match self {
-            BlockBound::None => {}
-            BlockBound::Positive => y[0] = positive(y[0]),
-            BlockBound::Cap(cap) => {
-                let norm = y.iter().map(|y| y * y).sum::<f64>().sqrt();
-                if norm > cap {
-                    y = y.map(|y| y * (cap / norm));
-                }
-            }
-        }
-        y
-    }
-}
-
 /// The law of a block as a line in the velocity; see [`super::joints`].
 #[derive(Clone, Debug)]
 pub struct LawLine {
@@ -168,14 +139,12 @@ pub struct LawLine {
     pub size: usize,
     /// K
     pub(super) response: [RowVector; ROWS],
-    /// K⁻¹
-    inverse: [RowVector; ROWS],
     /// P of [`Self::solution`], initially K⁻¹.
     pub(super) step: [RowVector; ROWS],
     /// α = q
     pub(super) alpha: f64,
     offset: RowVector,
-    pub(super) bound: BlockBound,
+    law: BlockLaw,
 }
 
 impl LawLine {
@@ -201,18 +170,8 @@ impl LawLine {
                 BlockLaw::Spring { stiffness, damping, .. } => stiffness / (1.0 + damping) * errors[i],
             };
         }
-        let bound = match (law, law.cap()) {
-            (BlockLaw::Limit, _) => BlockBound::Positive,
-            (_, Some(cap)) => BlockBound::Cap(cap),
-            (_, None) => BlockBound::None,
-        };
-        let inverse = inverted(response, size).unwrap_or_default();
-        LawLine { size, response, inverse, step: inverse, alpha, offset, bound }
-    }
-
-    /// K⁻¹ x
-    fn solved(&self, x: RowVector) -> RowVector {
-        product(&self.inverse, x)
+        let step = inverted(response, size).unwrap_or_default();
+        LawLine { size, response, step, alpha, offset, law }
     }
 
     /// Π(y), y = λ − P (c + q J v + (1 − α) K λ): the impulses that satisfy the block alone, at the velocity
@@ -221,22 +180,19 @@ impl LawLine {
         let soft = product(&self.response, l);
         let f = [0, 1, 2].map(|i| self.offset[i] + self.alpha * u[i] + (1.0 - self.alpha) * soft[i]);
         let x = product(&self.step, f);
-        self.bound.project([0, 1, 2].map(|i| l[i] - x[i]))
+        self.project([0, 1, 2].map(|i| l[i] - x[i]))
     }
 
-    /// Impulses of a spring whose force does not depend on the velocity.
-    pub(super) fn fixed(&self) -> Option<RowVector> {
-        (self.alpha < UNDAMPED).then(|| self.bound.project(self.solved(self.offset).map(|x| -x)))
-    }
-
-    /// b of J v + b + R λ = 0 (m/s or rad/s).
-    pub(super) fn bias(&self) -> RowVector {
-        self.offset.map(|c| c / self.alpha)
-    }
-
-    /// R = `softness` K (1).
-    pub(super) fn softness(&self) -> f64 {
-        (1.0 - self.alpha) / self.alpha
+    /// Π; NaN stays NaN.
+    fn project(&self, y: RowVector) -> RowVector {
+        match (self.law, self.law.cap()) {
+            (BlockLaw::Limit, _) => [positive(y[0]), y[1], y[2]],
+            (_, Some(cap)) => {
+                let norm = y.iter().map(|y| y * y).sum::<f64>().sqrt();
+                if norm > cap { y.map(|y| y * (cap / norm)) } else { y }
+            }
+            (_, None) => y,
+        }
     }
 }
 
