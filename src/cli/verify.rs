@@ -8,6 +8,7 @@ use crate::engine::constraints::Impacts;
 use crate::engine::solvers::{DEFAULT, VARIANTS, Variant};
 use crate::lab::ablate;
 use crate::lab::error::Error;
+use crate::lab::units::number;
 use crate::lab::verify::{self, CASES, Case, Cell, Finding, Lab, LawOf, Required, VerifyMatrix};
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
@@ -259,29 +260,6 @@ fn cell_text(cell: &Cell, with_truth: bool) -> String {
     }
 }
 
-/// Four significant digits; in powers of ten if that is shorter.
-fn number(value: f64) -> String {
-    match value.abs() {
-        _ if value.is_infinite() => {
-            if value > 0.0 {
-                "∞".into()
-            } else {
-                "-∞".into()
-            }
-        }
-        0.0 => "0".into(),
-        size if (0.01..1e5).contains(&size) => {
-            let digits = (3 - size.log10().floor() as i32).max(0) as usize;
-            let text = format!("{value:.digits$}");
-            match text.contains('.') {
-                true => text.trim_end_matches('0').trim_end_matches('.').to_string(),
-                false => text,
-            }
-        }
-        _ => format!("{value:.2e}"),
-    }
-}
-
 fn json(matrix: &VerifyMatrix, impacts: Impacts) -> Value {
     let cell = |case: &Case, solver: &Variant, cell: &Cell| {
         let mut value = json!({
@@ -340,23 +318,6 @@ fn print(text: &str, code: ExitCode) -> Result<ExitCode, Error> {
 mod tests {
     use super::*;
     use crate::engine::solvers::VARIANTS;
-
-    #[test]
-    fn numbers_have_four_digits() {
-        for (value, text) in [
-            (0.0, "0"),
-            (13.0, "13"),
-            (0.38333, "0.3833"),
-            (4454.9, "4455"),
-            (-4.529, "-4.529"),
-            (1e5, "1.00e5"),
-            (7.72e-5, "7.72e-5"),
-            (f64::INFINITY, "∞"),
-            (f64::NEG_INFINITY, "-∞"),
-        ] {
-            assert_eq!(number(value), text);
-        }
-    }
 
     #[test]
     fn a_cell_shows_verdict_value_and_margin() {

@@ -58,7 +58,7 @@ pub(super) static CASES: &[Case] = &[
         .within("1e-4 m/s")
         .required("required although contacts of 30 Hz cannot hold it: see the promises")
         .by(|lab| stack(lab, 20).map(|found| found.finding(found.speed, REST))),
-    Case::new("B5.height", "tallest stack that rests after 20 s (table: distance from the axis, m)", "boxes")
+    Case::new("B5.height", "tallest stack that rests after 20 s (note: distance from the axis, m)", "boxes")
         .within("60 boxes have to stand")
         .required("loads are fed forward, so a lean decays")
         .by(|lab| {
@@ -195,7 +195,7 @@ const RATIOS: &[f64] = &[1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4];
 
 /// Two discs of these masses (kg), the lower one first. They rest after ten seconds if they keep their order,
 /// sink no deeper than the slop or a soft contact under its load, and have a kinetic energy below 1e-6 J per
-/// kg. The table lists the depth of the upper contact.
+/// kg. The note lists the depth of the upper contact.
 fn rests(lab: &Lab, masses: [f64; 2]) -> Result<(f64, bool), Failure> {
     let disc = |i: usize| {
         let shape = SceneShape::disc(0.5).density(4.0 * masses[i] / PI);

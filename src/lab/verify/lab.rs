@@ -13,6 +13,7 @@ use crate::engine::solvers::Variant;
 use crate::engine::world::Settings;
 use crate::lab::scenes;
 pub(super) use crate::lab::scenes::holds::energies;
+use crate::lab::units::number;
 use std::ops::Range;
 
 /// What a case measures.
@@ -414,7 +415,7 @@ pub(super) fn sweep(
         };
         all_hold &= holds;
         held = if all_hold { value } else { held };
-        each.push(format!("{value}: {}{measured:.3e}", if holds { "" } else { "FAIL " }));
+        each.push(format!("{}: {}{}", number(value), if holds { "" } else { "FAIL " }, number(measured)));
     }
     let all = values.last().copied().unwrap_or(0.0);
     Ok(Finding::new(held, all, 0.0).note(format!("{parameter} {}", each.join(", "))))
