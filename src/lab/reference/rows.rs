@@ -35,56 +35,7 @@ pub struct ProblemBlock {
 }
 
 /// The law of a block; see [`super::joints`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum BlockLaw {
-    /// C = 0.
-    Rigid,
-    /// C ≥ 0, for a single row.
-    Limit,
-    /// J v = u.
-    Motor {
-        /// u (m/s or rad/s)
-        speed: f64,
-        /// F h (N·s or N·m·s)
-        cap: f64,
-    },
-    /// A spring.
-    Spring {
-        /// S (1/s)
-        stiffness: f64,
-        /// D (1)
-        damping: f64,
-        /// F h (N·s or N·m·s); `None` if unbounded.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        cap: Option<f64>,
-    },
-}
-
-impl From<RowLaw<f32>> for BlockLaw {
-    fn from(law: RowLaw<f32>) -> Self {
-        match law {
-            RowLaw::Rigid => BlockLaw::Rigid,
-            RowLaw::Limit => BlockLaw::Limit,
-            RowLaw::Motor { speed, cap } => BlockLaw::Motor { speed: speed.into(), cap: cap.into() },
-            RowLaw::Spring { stiffness, damping, cap } => {
-                let cap = cap.map(f64::from);
-                BlockLaw::Spring { stiffness: stiffness.into(), damping: damping.into(), cap }
-            }
-        }
-    }
-}
-
-impl BlockLaw {
-    /// Largest norm of its impulses; `None` if unbounded.
-    pub fn cap(&self) -> Option<f64> {
-        match *self {
-            BlockLaw::Motor { cap, .. } => Some(cap),
-            BlockLaw::Spring { cap, .. } => cap,
-            BlockLaw::Rigid | BlockLaw::Limit => None,
-        }
-    }
-}
+pub type BlockLaw = RowLaw<f64>;
 
 /// A row of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
