@@ -9,6 +9,7 @@ use crate::engine::world::Settings;
 use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::overrides;
+use crate::lab::parallel::{in_parallel, processors};
 use crate::lab::report::environment::Environment;
 use crate::lab::study::budget;
 use crate::lab::torture::families::{FAMILIES, Family};
@@ -24,8 +25,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// Random scenes.
 #[derive(Clone, Copy, Debug)]
@@ -240,37 +241,17 @@ fn opened(path: &Path) -> Result<(Vec<TortureRow>, Option<File>), Error> {
 /// Runs all jobs on `--threads` threads (by default one per core, or one with `--pace`). Rows are in the
 /// order of the jobs.
 fn run_all(args: &VerifyArgs, jobs: &[TortureJob], log: Option<File>) -> Result<Vec<TortureRow>, Error> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let cores = if args.random.pace.is_some() { 1 } else { cores };
-    let threads = args.threads.map_or(cores, usize::from).min(jobs.len()).max(1);
-    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let (found, log, bar) = (Mutex::new(Vec::new()), Mutex::new(log), Bar::new());
-    let work = || -> Result<(), Error> {
-        loop {
-            let k = next.fetch_add(1, Ordering::Relaxed);
-            let Some(&(family, number, solver)) = jobs.get(k) else { return Ok(()) };
-            let row = one(args, family, number, solver)?;
-            if let Some(log) = lock(&log).as_mut() {
-                let line = serde_json::to_string(&row).map_err(|e| Error::invalid("--log", e.to_string()))?;
-                writeln!(log, "{line}").map_err(Error::io(args.random.log.clone().unwrap_or_default()))?;
-            }
-            lock(&found).push((k, row));
-            bar.step(done.fetch_add(1, Ordering::Relaxed) + 1, jobs.len(), "runs");
+    let cores = if args.random.pace.is_some() { 1 } else { processors() };
+    let (done, log, bar) = (AtomicUsize::new(0), Mutex::new(log), Bar::new());
+    in_parallel(jobs, args.threads.map_or(cores, usize::from), |&(family, number, solver)| {
+        let row = one(args, family, number, solver)?;
+        if let Some(log) = log.lock().unwrap_or_else(PoisonError::into_inner).as_mut() {
+            let line = serde_json::to_string(&row).map_err(|e| Error::invalid("--log", e.to_string()))?;
+            writeln!(log, "{line}").map_err(Error::io(args.random.log.clone().unwrap_or_default()))?;
         }
-    };
-    std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-        let joined = workers.into_iter().map(|w| w.join().unwrap_or_else(|e| std::panic::resume_unwind(e)));
-        joined.collect::<Result<Vec<()>, Error>>()
-    })?;
-    drop(bar);
-    let mut rows = found.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-    rows.sort_by_key(|(k, _)| *k);
-    Ok(rows.into_iter().map(|(_, row)| row).collect())
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+        bar.step(done.fetch_add(1, Ordering::Relaxed) + 1, jobs.len(), "runs");
+        Ok(row)
+    })
 }
 
 /// Runs one scene under one solver. If it fails and a folder is given, the scene is minimized and written

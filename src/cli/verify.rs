@@ -8,9 +8,8 @@ use crate::engine::constraints::Impacts;
 use crate::engine::solvers::{DEFAULT, VARIANTS, Variant};
 use crate::lab::ablate;
 use crate::lab::error::Error;
-use crate::lab::verify::{
-    self, CASES, Case, Cell, Finding, Lab, LawOf, ParameterSweep, Required, SweepRow, VerifyMatrix,
-};
+use crate::lab::units::number;
+use crate::lab::verify::{self, CASES, Case, Cell, Finding, Lab, LawOf, Required, VerifyMatrix};
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 use comfy_table::{ContentArrangement, Table, presets};
@@ -202,7 +201,8 @@ reference: what it should be.  n/a: the reference value is that of soft contacts
 ";
 
 fn text(matrix: &VerifyMatrix) -> String {
-    let mut table = plain();
+    let mut table = Table::new();
+    table.load_style(presets::ASCII_MARKDOWN).set_content_arrangement(ContentArrangement::Dynamic);
     let names = matrix.solvers.iter().map(|s| s.name.to_string());
     table.set_header(["case", "what", "reference", "tolerance"].map(String::from).into_iter().chain(names));
     for (case, cells) in matrix.cases.iter().zip(&matrix.cells) {
@@ -216,9 +216,8 @@ fn text(matrix: &VerifyMatrix) -> String {
         table.add_row(row);
     }
     let mut text = format!("{LEGEND}\n{table}\n");
-    for (c, case) in matrix.cases.iter().enumerate() {
-        text += &sweeps(matrix, c, case);
-        for (solver, cell) in matrix.solvers.iter().zip(&matrix.cells[c]) {
+    for (case, cells) in matrix.cases.iter().zip(&matrix.cells) {
+        for (solver, cell) in matrix.solvers.iter().zip(cells) {
             let note = match cell {
                 Cell::Found(finding) => finding.note.clone(),
                 Cell::Failed(failure) => failure.to_string(),
@@ -261,57 +260,6 @@ fn cell_text(cell: &Cell, with_truth: bool) -> String {
     }
 }
 
-/// Table of a sweep, one column per solver.
-fn sweeps(matrix: &VerifyMatrix, row: usize, case: &Case) -> String {
-    let columns = matrix.solvers.iter().zip(&matrix.cells[row]);
-    let found: Vec<(&str, &ParameterSweep)> = columns
-        .filter_map(|(solver, cell)| match cell {
-            Cell::Found(Finding { sweep: Some(sweep), .. }) => Some((solver.name, sweep)),
-            _ => None,
-        })
-        .collect();
-    let Some((_, first)) = found.first() else { return String::new() };
-    let mut table = plain();
-    table.set_header(std::iter::once(first.parameter).chain(found.iter().map(|(name, _)| *name)));
-    for (i, row) in first.rows.iter().enumerate() {
-        let cells = found.iter().map(|(_, sweep)| match sweep.rows.get(i) {
-            Some(row) => format!("{} {}", if row.holds { "pass" } else { "FAIL" }, number(row.measured)),
-            None => String::new(),
-        });
-        table.add_row(std::iter::once(number(row.value)).chain(cells));
-    }
-    format!("\n{}: {}\n{table}\n", case.id, case.summary)
-}
-
-fn plain() -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN).set_content_arrangement(ContentArrangement::Dynamic);
-    table
-}
-
-/// Four significant digits; in powers of ten if that is shorter.
-fn number(value: f64) -> String {
-    match value.abs() {
-        _ if value.is_infinite() => {
-            if value > 0.0 {
-                "∞".into()
-            } else {
-                "-∞".into()
-            }
-        }
-        0.0 => "0".into(),
-        size if (0.01..1e5).contains(&size) => {
-            let digits = (3 - size.log10().floor() as i32).max(0) as usize;
-            let text = format!("{value:.digits$}");
-            match text.contains('.') {
-                true => text.trim_end_matches('0').trim_end_matches('.').to_string(),
-                false => text,
-            }
-        }
-        _ => format!("{value:.2e}"),
-    }
-}
-
 fn json(matrix: &VerifyMatrix, impacts: Impacts) -> Value {
     let cell = |case: &Case, solver: &Variant, cell: &Cell| {
         let mut value = json!({
@@ -333,11 +281,6 @@ fn json(matrix: &VerifyMatrix, impacts: Impacts) -> Value {
                     value[key] = finite(x);
                 }
                 value["note"] = json!(f.note);
-                if let Some(sweep) = &f.sweep {
-                    let row = |r: &SweepRow| json!([finite(r.value), finite(r.measured), r.holds]);
-                    let rows: Vec<_> = sweep.rows.iter().map(row).collect();
-                    value["sweep"] = json!({ "parameter": sweep.parameter, "rows": rows });
-                }
             }
         }
         value
@@ -346,7 +289,7 @@ fn json(matrix: &VerifyMatrix, impacts: Impacts) -> Value {
         .flat_map(|(case, cells)| matrix.solvers.iter().zip(cells).map(|(solver, c)| cell(case, solver, c)))
         .collect();
     json!({
-        "version": 2,
+        "version": 3,
         "default_solver": DEFAULT,
         "broken_promises": matrix.broken_promises(DEFAULT),
         "cases": matrix.cases.iter().map(described).collect::<Vec<_>>(),
@@ -375,23 +318,6 @@ fn print(text: &str, code: ExitCode) -> Result<ExitCode, Error> {
 mod tests {
     use super::*;
     use crate::engine::solvers::VARIANTS;
-
-    #[test]
-    fn numbers_have_four_digits() {
-        for (value, text) in [
-            (0.0, "0"),
-            (13.0, "13"),
-            (0.38333, "0.3833"),
-            (4454.9, "4455"),
-            (-4.529, "-4.529"),
-            (1e5, "1.00e5"),
-            (7.72e-5, "7.72e-5"),
-            (f64::INFINITY, "∞"),
-            (f64::NEG_INFINITY, "-∞"),
-        ] {
-            assert_eq!(number(value), text);
-        }
-    }
 
     #[test]
     fn a_cell_shows_verdict_value_and_margin() {

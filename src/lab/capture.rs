@@ -89,7 +89,7 @@ fn joints(world: &World, index: &[Option<u32>]) -> Vec<ProblemJoint> {
             joints.push((number, ProblemJoint { body_a, body_b, reach, blocks: Vec::new() }));
         }
         if let Some((_, joint)) = joints.last_mut() {
-            joint.blocks.push(ProblemBlock { law: block.law.into(), rows });
+            joint.blocks.push(ProblemBlock { law: block.law.map(f64::from), rows });
         }
     }
     joints.into_iter().map(|(_, joint)| joint).collect()

@@ -88,7 +88,7 @@
 //! ```text
 //! error                          what can go wrong
 //! files  overrides  interned     result files; parameters by name; names read from files
-//! units  memory                  human-readable numbers; what fits in memory
+//! units  memory  parallel        human-readable numbers; what fits in memory; jobs on threads
 //! reference  metrics             certified solutions; errors read from states
 //! scenes  capture  picture       what is simulated, and its known truth; frozen problems; frames drawn
 //! trial                          one run to its verdict
@@ -115,6 +115,8 @@ pub mod interned;
 pub mod memory;
 pub mod metrics;
 pub mod overrides;
+#[doc(hidden)]
+pub mod parallel;
 pub mod picture;
 pub mod profile;
 pub mod recording;

@@ -45,6 +45,29 @@ pub fn digits(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
+/// Four significant digits; in powers of ten if that is shorter.
+pub fn number(value: f64) -> String {
+    match value.abs() {
+        _ if value.is_infinite() => {
+            if value > 0.0 {
+                "∞".into()
+            } else {
+                "-∞".into()
+            }
+        }
+        0.0 => "0".into(),
+        size if (0.01..1e5).contains(&size) => {
+            let digits = (3 - size.log10().floor() as i32).max(0) as usize;
+            let text = format!("{value:.digits$}");
+            match text.contains('.') {
+                true => text.trim_end_matches('0').trim_end_matches('.').to_string(),
+                false => text,
+            }
+        }
+        _ => format!("{value:.2e}"),
+    }
+}
+
 /// A count with its noun: `1 scene`, `2 scenes`.
 pub fn count(number: usize, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
@@ -127,6 +150,23 @@ pub fn wrapped(text: &str, most: usize) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_have_four_digits() {
+        for (value, text) in [
+            (0.0, "0"),
+            (13.0, "13"),
+            (0.38333, "0.3833"),
+            (4454.9, "4455"),
+            (-4.529, "-4.529"),
+            (1e5, "1.00e5"),
+            (7.72e-5, "7.72e-5"),
+            (f64::INFINITY, "∞"),
+            (f64::NEG_INFINITY, "-∞"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
 
     #[test]
     fn prefixes_fit_and_do_not_round_to_a_thousand() {

@@ -46,7 +46,7 @@ const CONSTRAINTS: &[&[&str]] =
     &[&["numerics"], &["records"], &["kernels"], &["joints", "vectors", "impacts"], &["step"]];
 const LAB: &[&[&str]] = &[
     &["error"],
-    &["files", "interned", "memory", "overrides", "units"],
+    &["files", "interned", "memory", "overrides", "parallel", "units"],
     &["reference"],
     &["metrics"],
     &["scenes", "capture", "picture"],

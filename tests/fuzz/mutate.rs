@@ -16,7 +16,7 @@ const WORDS: &[&str] = &[
     "\"type\"", "\"dynamic\"", "\"static\"", "\"kinematic\"", "\"position\"", "\"angle\"", "\"velocity\"",
     "\"angular_velocity\"", "\"gravity_scale\"", "\"group\"", "\"shapes\"", "\"circle\"", "\"box\"",
     "\"polygon\"", "\"capsule\"", "\"segment\"", "\"half\"", "\"radius\"", "\"center\"", "\"points\"",
-    "\"density\"", "\"friction\"", "\"restitution\"", "\"version\"", "\"bytes\"", "\"checksum\"",
+    "\"density\"", "\"friction\"", "\"restitution\"", "\"version\"",
     "\"reference\"", "[[[[[[[[", "{\"a\":{\"a\":", "1e", ".5", "+1", "0x10", "um", "mm", " m", "e",
 ];
 
@@ -127,8 +127,8 @@ pub fn scene(random: &mut Random, bytes: &mut Vec<u8>, seeds: &[Vec<u8>]) {
     *bytes = scene.to_string().into_bytes();
 }
 
-/// Changes the header, the text or a value of a frozen problem. Where the payload changes, the header is made to
-/// match again, so that the payload is read, and the reference, which no longer holds, is usually removed.
+/// Changes the header, the text or a value of a frozen problem. Where a value changes, the reference, which no longer
+/// holds, is usually removed, and the header has the version that the payload needs.
 pub fn frozen(random: &mut Random, bytes: &mut Vec<u8>, seeds: &[Vec<u8>]) {
     let end = bytes.iter().position(|&b| b == b'\n').unwrap_or(bytes.len());
     let (header, payload) = (bytes[..end].to_vec(), &bytes[end..]);
@@ -152,13 +152,9 @@ pub fn frozen(random: &mut Random, bytes: &mut Vec<u8>, seeds: &[Vec<u8>]) {
     }
     let payload = String::from_utf8_lossy(&payload);
     let payload = payload.trim_end_matches('\n');
-    // FNV-1a, implemented independently.
-    let step = |hash: u64, byte| (hash ^ u64::from(byte)).wrapping_mul(1_099_511_628_211);
-    let hash = payload.bytes().fold(14_695_981_039_346_656_037, step);
     // Problems with joints have version 2.
     let version = if payload.contains(r#""joints":[{"#) { 2 } else { 1 };
-    let sum = format!(r#""version":{version},"bytes":{},"checksum":"fnv1a64:{hash:016x}""#, payload.len());
-    *bytes = format!("{{\"format\":\"simpulse-frozen\",{sum}}}\n{payload}\n").into_bytes();
+    *bytes = format!("{{\"format\":\"simpulse-frozen\",\"version\":{version}}}\n{payload}\n").into_bytes();
 }
 
 /// Changes a random place in the value.

@@ -16,51 +16,6 @@ fn stepped(scene: &Scene, steps: u32) -> World {
     common::run(scene, common::named("shim"), steps)
 }
 
-/// Ten tables on top of each other, each on two legs, come to rest within ten seconds.
-#[test]
-fn tables_on_tables_rest() {
-    let table = |i: u32| {
-        let y = 1.5 * f64::from(i);
-        let part = |x, y, [w, h]: [f64; 2]| SceneBody::dynamic([x, y], SceneShape::rectangle(w, h));
-        let leg = |x| part(x, y + 0.5, [0.2, 0.5]);
-        [leg(-1.5), leg(1.5), part(0.0, y + 1.25, [2.0, 0.25])]
-    };
-    let fastest = common::fastest(&stepped(&common::on_ground((0..10).flat_map(table).collect()), 600));
-    assert!(fastest < 1e-3, "{fastest}");
-}
-
-/// Bodies of a scene, moved along x.
-fn moved(name: &str, by: f64) -> Vec<SceneBody> {
-    let mut bodies = common::scene(name).bodies;
-    for body in &mut bodies {
-        body.position[0] += by;
-    }
-    bodies
-}
-
-/// A step's effect on a pile does not depend on another pile in the same world. Positions agree up to what
-/// other colors, and so another order of contacts, cause within a second.
-#[test]
-fn a_pile_knows_nothing_of_another() {
-    let falling = |x: f64| {
-        (0..40).map(move |i| {
-            SceneBody::dynamic([x + 1.2 * f64::from(i), 4.0], SceneShape::rectangle(0.5, 0.5))
-                .moving([0.0, -3.0], 0.0)
-        })
-    };
-    let alone = moved("pyramid:8", 0.0);
-    let mut both = alone.clone();
-    both.extend(moved("stack:40", 200.0));
-    both.extend(falling(300.0));
-    both.push(SceneBody::fixed([320.0, -1.0], SceneShape::rectangle(60.0, 1.0)));
-    let run = |bodies: Vec<SceneBody>| stepped(&Scene::new("piles", bodies), 60);
-    let (one, two) = (run(alone.clone()), run(both));
-    for body in 0..alone.len() {
-        let [p, q] = [&one, &two].map(|world| world.bodies.pose(body).position);
-        assert!((p - q).length() < 1e-6, "body {body}: {p} alone, {q} beside others");
-    }
-}
-
 /// A stack that starts at rest stays there from its first step on. Springs are shortened by all of their sag,
 /// so only rounding is left: each contact below a body at p rounds its separation to ε |p|.
 #[test]

@@ -60,12 +60,13 @@ fn every_family_reproduces_the_stored_velocities() {
             let stop = Stop { tolerance: 1e-12, iterations: 20_000 };
             iterate(&problem, Target::Rigid, &problem.no_impulses(), method, stop).impulses
         };
-        for (name, impulses) in [
-            ("Lemke", stewart_trinkle(&problem, Target::Rigid).unwrap()),
+        let lemke = problem.joints.is_empty().then(|| stewart_trinkle(&problem, Target::Rigid).unwrap());
+        let iterations = [
             ("PGS", by(Iteration::Symmetric)),
             ("NNCG", by(Iteration::Conjugate)),
             ("Anderson", by(Iteration::Anderson(20))),
-        ] {
+        ];
+        for (name, impulses) in iterations.into_iter().chain(lemke.map(|impulses| ("Lemke", impulses))) {
             let distance = problem.velocity_error(&problem.velocities(&impulses), &reference.velocities);
             assert!(distance <= AGREED, "{name} on {}: {distance:e}", problem.name);
         }

@@ -1,8 +1,8 @@
-//! `converge.svg`: residual against sweeps and, beside it, against time, for each law and start.
+//! `converge.svg`: residual against sweeps, for each law and start.
 //!
 //! Both axes are logarithmic. One color per solver, paler for a part of its schedule; solid lines are in natural order,
 //! dashed ones in others. A marker shows where a curve first reaches a tolerance: filled in natural order, hollow in
-//! colored order. Thin curves are the `f64` methods, which have no time.
+//! colored order. Thin curves are the `f64` methods.
 
 use super::replay::{Sequence, Start};
 use super::warm::WarmStartSource;
@@ -33,13 +33,7 @@ pub fn svg(report: &ConvergeReport, styles: Styles) -> String {
             names.push((label, styles(name(&curve.solver))));
         }
     }
-    let timed = report.curves.iter().any(|c| c.iteration.is_some());
-    let row = |law: &LawRow| {
-        let notes = coinciding(report, law);
-        let by_sweeps = chart(report, law, styles, false);
-        let by_time = timed.then(|| chart(report, law, styles, true));
-        (format!("{}{notes}", law.title), by_sweeps.into_iter().chain(by_time.flatten()).collect())
-    };
+    let row = |law: &LawRow| (law.title.clone(), chart(report, law, styles).into_iter().collect());
     let rows: Vec<(String, Vec<Chart>)> = laws(report).iter().map(row).collect();
     let names: Vec<(&str, Style)> = names.iter().map(|(label, style)| (label.as_str(), *style)).collect();
     let title = format!(
@@ -70,42 +64,19 @@ fn name(curve: &str) -> &str {
     curve.split(' ').next().unwrap_or(curve)
 }
 
-/// A note on solvers whose curves coincide under a law, `a = b`; empty if there are none.
-fn coinciding(report: &ConvergeReport, law: &LawRow) -> String {
-    let curves = report.curves.iter().filter(|c| c.start == law.start);
-    let values = |c: &ReplayCurve| c.points.iter().map(|p| (p.sweeps, (law.residual)(p))).collect::<Vec<_>>();
-    let mut groups: Vec<(&ReplayCurve, Vec<&str>)> = Vec::new();
-    for curve in curves.filter(|c| c.points.iter().any(|p| (law.residual)(p).is_some())) {
-        let same = |first: &ReplayCurve| first.order == curve.order && values(first) == values(curve);
-        match groups.iter_mut().find(|(first, _)| same(first)) {
-            Some((_, names)) => names.push(&curve.solver),
-            None => groups.push((curve, vec![&curve.solver])),
-        }
-    }
-    let mut found: Vec<String> =
-        groups.into_iter().filter(|(_, names)| names.len() > 1).map(|(_, names)| names.join(" = ")).collect();
-    found.sort();
-    found.dedup();
-    if found.is_empty() { String::new() } else { format!(" (curves that coincide: {})", found.join("; ")) }
-}
-
-/// The chart of a law against sweeps, or against time; `None` if nothing was measured.
-fn chart(report: &ConvergeReport, law: &LawRow, styles: Styles, by_time: bool) -> Option<Chart> {
+/// The chart of a law; `None` if nothing was measured.
+fn chart(report: &ConvergeReport, law: &LawRow, styles: Styles) -> Option<Chart> {
     // If a solver's result does not depend on the start, its cold curve stands for both.
     let remembers = |c: &ReplayCurve| {
         let same = |o: &&ReplayCurve| o.solver == c.solver && o.order == c.order && o.start == Start::Warm;
         report.curves.iter().any(|o| same(&o))
-    };
-    let across = |c: &ReplayCurve, p: &CurvePoint| match by_time {
-        true => c.iteration.as_ref().map(|time| 1e-9 * time.median_ns * f64::from(p.iterations)),
-        false => Some(p.sweeps as f64),
     };
     let curves = report.curves.iter().filter(|c| c.start == law.start || !remembers(c));
     let series: Vec<Series> = curves
         .map(|curve| {
             let first = (law.reached)(curve).first;
             let mark = |(i, point): (usize, &CurvePoint)| {
-                let x = across(curve, point).filter(|x| *x > 0.0)?;
+                let x = (point.sweeps > 0).then_some(point.sweeps as f64)?;
                 let y = (law.residual)(point).filter(|r| r.is_finite())?;
                 let reached = first.iter().position(|place| *place == Some(i));
                 let size = if reached.is_some() && curve.arithmetic == "f32" { 4.0 } else { 0.0 };
@@ -128,11 +99,10 @@ fn chart(report: &ConvergeReport, law: &LawRow, styles: Styles, by_time: bool) -
     let xs: Vec<f64> = series.iter().flat_map(|s| &s.marks).map(|m| m.x).collect();
     let mut y = Scale::log(SHOWN, "");
     [y.low, y.high] = SHOWN;
-    let (name, unit) = if by_time { ("time, set-up excluded", "s") } else { ("constraint sweeps", "") };
     (!xs.is_empty()).then(|| Chart {
         size: [520, 320],
         title: String::new(),
-        x: Axis { name: name.into(), scale: Scale::log(xs, unit) },
+        x: Axis { name: "constraint sweeps".into(), scale: Scale::log(xs, "") },
         y: Axis { name: "residual".into(), scale: y },
         strip: FailStrip::None,
         good: [None; 2],

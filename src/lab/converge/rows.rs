@@ -10,62 +10,27 @@ use crate::engine::constraints::kernels::types::ConstraintSet;
 use crate::engine::lanes::Lanes;
 use crate::lab::error::Error;
 use crate::lab::reference::validate::BLOCKS;
-use crate::lab::reference::{BlockLaw, ContactProblem, DPair, ProblemBlock, ProblemJoint};
+use crate::lab::reference::{ContactProblem, DPair, ProblemBlock, ProblemJoint};
+
+/// A law without its numbers.
+type LawForm = RowLaw<()>;
 
 /// Blocks of a joint: the number of rows and the law of each.
 type ProblemBlocks = [Option<(usize, LawForm)>; BLOCKS];
 
-/// Kind of a law, without its numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum LawForm {
-    Rigid,
-    Limit,
-    Motor,
-    Spring,
-    CappedSpring,
-}
-
 /// Numbers per row: axis (two), two arms, error.
 const ROW: usize = 5;
 
-impl LawForm {
-    fn of(law: &BlockLaw) -> Self {
-        match law {
-            BlockLaw::Rigid => LawForm::Rigid,
-            BlockLaw::Limit => LawForm::Limit,
-            BlockLaw::Motor { .. } => LawForm::Motor,
-            BlockLaw::Spring { cap: None, .. } => LawForm::Spring,
-            BlockLaw::Spring { cap: Some(_), .. } => LawForm::CappedSpring,
-        }
-    }
+/// How many numbers a law has.
+fn numbers_of(law: LawForm) -> usize {
+    let mut count = 0;
+    law.map(|()| count += 1);
+    count
+}
 
-    const fn numbers(self) -> usize {
-        match self {
-            LawForm::Rigid | LawForm::Limit => 0,
-            LawForm::Motor | LawForm::Spring => 2,
-            LawForm::CappedSpring => 3,
-        }
-    }
-
-    /// Numbers kept per row: the impulse, and the error of a spring.
-    const fn kept(self) -> usize {
-        match self {
-            LawForm::Rigid | LawForm::Limit | LawForm::Motor => 1,
-            LawForm::Spring | LawForm::CappedSpring => 2,
-        }
-    }
-
-    fn law<L: Lanes>(self, numbers: &[L]) -> RowLaw<L> {
-        match self {
-            LawForm::Rigid => RowLaw::Rigid,
-            LawForm::Limit => RowLaw::Limit,
-            LawForm::Motor => RowLaw::Motor { speed: numbers[0], cap: numbers[1] },
-            LawForm::Spring => RowLaw::Spring { stiffness: numbers[0], damping: numbers[1], cap: None },
-            LawForm::CappedSpring => {
-                RowLaw::Spring { stiffness: numbers[0], damping: numbers[1], cap: Some(numbers[2]) }
-            }
-        }
-    }
+/// Numbers kept per row: the impulse, and the error of a spring.
+fn kept_of(law: LawForm) -> usize {
+    if matches!(law, RowLaw::Spring { .. }) { 2 } else { 1 }
 }
 
 /// A joint of a problem.
@@ -78,7 +43,7 @@ struct FrozenJoint {
 fn form(joint: &ProblemJoint) -> ProblemBlocks {
     let mut form = [None; BLOCKS];
     for (form, block) in form.iter_mut().zip(&joint.blocks) {
-        *form = Some((block.rows.len(), LawForm::of(&block.law)));
+        *form = Some((block.rows.len(), block.law.map(|_| ())));
     }
     form
 }
@@ -86,12 +51,9 @@ fn form(joint: &ProblemJoint) -> ProblemBlocks {
 /// Numbers of a block, in the order in which the kernel reads them.
 fn numbers(block: &ProblemBlock) -> Vec<f32> {
     let rows = block.rows.iter().flat_map(|row| [row.axis[0], row.axis[1], row.arm_a, row.arm_b, row.error]);
-    let law = match block.law {
-        BlockLaw::Rigid | BlockLaw::Limit => [None; 3],
-        BlockLaw::Motor { speed, cap } => [Some(speed), Some(cap), None],
-        BlockLaw::Spring { stiffness, damping, cap } => [Some(stiffness), Some(damping), cap],
-    };
-    rows.chain(law.into_iter().flatten()).map(|x| x as f32).collect()
+    let mut numbers: Vec<f32> = rows.map(|x| x as f32).collect();
+    block.law.map(|x| numbers.push(x as f32));
+    numbers
 }
 
 impl JointType for FrozenJoint {
@@ -103,11 +65,11 @@ impl JointType for FrozenJoint {
     }
 
     fn numbers(form: ProblemBlocks) -> usize {
-        form.into_iter().flatten().map(|(rows, law)| ROW * rows + law.numbers()).sum()
+        form.into_iter().flatten().map(|(rows, law)| ROW * rows + numbers_of(law)).sum()
     }
 
     fn kept(form: ProblemBlocks) -> usize {
-        form.into_iter().flatten().map(|(rows, law)| rows * law.kept()).sum()
+        form.into_iter().flatten().map(|(rows, law)| rows * kept_of(law)).sum()
     }
 
     fn place(&self, _: ProblemBlocks, _: JointSetup<'_>, numbers: &mut [f32]) {
@@ -118,8 +80,8 @@ impl JointType for FrozenJoint {
     fn rows<L: Lanes>(form: ProblemBlocks, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
         let (mut numbers, mut kept) = (numbers, kept);
         for (rows, law) in form.into_iter().flatten() {
-            let (of_block, others) = numbers.split_at(ROW * rows + law.numbers());
-            let (impulses, rest) = kept.split_at_mut(rows * law.kept());
+            let (of_block, others) = numbers.split_at(ROW * rows + numbers_of(law));
+            let (impulses, rest) = kept.split_at_mut(rows * kept_of(law));
             (numbers, kept) = (others, rest);
             match rows {
                 1 => block::<L, 1>(law, of_block, impulses, on),
@@ -138,7 +100,8 @@ fn block<L: Lanes, const N: usize>(law: LawForm, numbers: &[L], kept: &mut [L], 
         Jacobian { axis: [row[0], row[1]], arms: [row[2], row[3]] }
     });
     let error = std::array::from_fn(|i| row(i)[4] + on.travel(&j[i]));
-    on.block(j, error, law.law(&numbers[ROW * N..]), kept);
+    let mut of_law = numbers[ROW * N..].iter();
+    on.block(j, error, law.map(|()| of_law.next().copied().unwrap_or(L::zero())), kept);
 }
 
 /// The joints of a problem in groups that are solved together, with the group of each joint and its index in
@@ -209,7 +172,7 @@ impl FrozenJoints {
             let mut next = 0;
             joint.blocks.iter().flat_map(move |block| {
                 let (first, rows) = (next, block.rows.len());
-                next += rows * LawForm::of(&block.law).kept();
+                next += rows * kept_of(block.law.map(|_| ()));
                 kept[first..first + rows].iter().map(|&impulse| [f64::from(impulse), 0.0])
             })
         })
@@ -218,6 +181,6 @@ impl FrozenJoints {
 
 /// Kept numbers of a block at the start of a warm step.
 fn warm_impulses(block: &ProblemBlock) -> impl Iterator<Item = f32> {
-    let errors = (LawForm::of(&block.law).kept() - 1) * block.rows.len();
+    let errors = (kept_of(block.law.map(|_| ())) - 1) * block.rows.len();
     block.rows.iter().map(|row| row.warm_impulse as f32).chain(std::iter::repeat_n(0.0, errors))
 }

@@ -80,7 +80,7 @@ impl<'a> JointBlock<'a> {
         }
         JointBlock {
             solved,
-            law: block.law.into(),
+            law: block.law.map(f64::from),
             response,
             errors: block.errors.map(f64::from),
             speeds,

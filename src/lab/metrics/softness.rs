@@ -72,13 +72,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_spring_gives_way_by_load_over_stiffness() {
-        // 20 N on 2 kg at 10 rad/s: 20/200 m.
-        assert_eq!(floor(20.0, 2.0, 10.0), 0.1);
-        assert_eq!([floor(-1.0, 2.0, 10.0), floor(20.0, 0.0, 10.0)], [0.0; 2]);
-    }
-
-    #[test]
     fn the_excess_is_over_each_points_own_floor() {
         let mut depths = Depths::default();
         depths.add(0.5, 0.25);

@@ -53,7 +53,6 @@ impl PointStep {
 #[cfg(test)]
 mod tests {
     use super::super::law::tests::{DT, moving, point, standing};
-    use super::*;
     use glam::DVec2;
 
     fn violation(impulse: [f64; 2], velocity: DVec2) -> [f64; 3] {
@@ -81,12 +80,5 @@ mod tests {
         assert_eq!(violation([3.0, 0.0], 2.0 * DVec2::X)[2], 3.0);
         assert_eq!(violation([3.0, -0.5], 2.0 * DVec2::X)[2], 2.0);
         assert_eq!(violation([3.0, 1.5], 2.0 * DVec2::X)[2], 6.0);
-    }
-
-    #[test]
-    fn the_larger_of_each_is_kept() {
-        let one = Violation { complementarity: 1.0, cone: 5.0, dissipation: 0.0 };
-        let other = Violation { complementarity: 2.0, cone: 3.0, dissipation: 4.0 };
-        assert_eq!(one.max(other), Violation { complementarity: 2.0, cone: 5.0, dissipation: 4.0 });
     }
 }

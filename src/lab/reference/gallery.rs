@@ -15,20 +15,19 @@ pub const GRAVITY: f64 = 10.0;
 struct Builder {
     problem: ContactProblem,
     centers: Vec<[f64; 2]>,
-    gravity: [f64; 2],
 }
 
 impl Builder {
     fn new(name: String, h: f64) -> Self {
         let problem = ContactProblem { name, h, bodies: vec![], contacts: vec![], joints: vec![] };
-        Builder { problem, centers: Vec::new(), gravity: [0.0, -GRAVITY] }
+        Builder { problem, centers: Vec::new() }
     }
 
     /// A body of `mass` and `inertia` (infinite allowed) with velocity v before the step.
     fn body(&mut self, center: [f64; 2], mass: f64, inertia: f64, velocity: Velocity) -> u32 {
         let h = self.problem.h;
         let [vx, vy, w] = velocity;
-        let free_velocity = [vx + h * self.gravity[0], vy + h * self.gravity[1], w];
+        let free_velocity = [vx, vy - h * GRAVITY, w];
         let body = ProblemBody { inv_mass: 1.0 / mass, inv_inertia: 1.0 / inertia, velocity, free_velocity };
         self.problem.bodies.push(body);
         self.centers.push(center);
@@ -126,26 +125,6 @@ pub fn sliding_box() -> ContactProblem {
     let mut p = Builder::new("sliding box".into(), H);
     let b = p.body([0.0, 0.5], 2.0, 2.0 / 6.0, [1.0, 0.0, 0.0]);
     p.manifold(None, Some(b), [[-0.5, 0.0], [0.5, 0.0]], UP, 0.3);
-    p.problem
-}
-
-/// A unit box at rest on a plane that descends to the left at `slope` rad, in the frame of the plane. It
-/// stays if µ ≥ tan θ, otherwise it gains h g (sin θ − µ cos θ) downhill (−x).
-pub fn block_on_incline(slope: f64, friction: f64) -> ContactProblem {
-    let mut p = Builder::new(format!("block on a slope of {slope} rad, µ {friction}"), H);
-    p.gravity = [-GRAVITY * slope.sin(), -GRAVITY * slope.cos()];
-    let b = p.body([0.0, 0.5], 1.0, 1.0 / 6.0, [0.0; 3]);
-    p.manifold(None, Some(b), [[-0.5, 0.0], [0.5, 0.0]], UP, friction);
-    p.problem
-}
-
-/// A disc (1 kg, 0.5 m) at rest on such a plane. It rolls and gains (2/3) h g sin θ if µ ≥ tan θ/3, otherwise
-/// it slips and gains h g (sin θ − µ cos θ).
-pub fn disc_on_incline(slope: f64, friction: f64) -> ContactProblem {
-    let mut p = Builder::new(format!("disc on a slope of {slope} rad, µ {friction}"), H);
-    p.gravity = [-GRAVITY * slope.sin(), -GRAVITY * slope.cos()];
-    let b = p.body([0.0, 0.5], 1.0, 0.125, [0.0; 3]);
-    p.contact(None, Some(b), [0.0, 0.0], UP, friction);
     p.problem
 }
 
@@ -340,10 +319,12 @@ mod tests {
     use crate::lab::reference::stewart_trinkle::stewart_trinkle;
     use crate::lab::reference::{DPair, Target};
 
-    /// Impulses by Lemke's method, certified by the residual code, which shares nothing with the LCP.
+    /// Impulses by Lemke's method, or with joints by the first method that certifies them, checked by the
+    /// residual code, which shares nothing with the LCP.
     fn solve(p: &ContactProblem) -> Vec<DPair> {
         p.validate().unwrap();
-        let impulses = stewart_trinkle(p, Target::Rigid).unwrap();
+        let lemke = p.joints.is_empty().then(|| stewart_trinkle(p, Target::Rigid).unwrap());
+        let impulses = lemke.unwrap_or_else(|| reference(p).unwrap().impulses);
         let residual = natural_map(p, Target::Rigid, &p.velocities(&impulses), &impulses) / p.impulse_unit();
         assert!(residual < 1e-12, "{}: natural map {residual:e}", p.name);
         impulses
@@ -400,7 +381,9 @@ mod tests {
                 [Iteration::Conjugate, Iteration::Anderson(10), Iteration::Symmetric, Iteration::SplitJacobi];
             for (i, axis, impulse) in expected {
                 let name = format!("{}, {i} {axis}", p.name);
-                close(&format!("{name}, Lemke"), solve(&p)[i][axis], impulse);
+                if p.joints.is_empty() {
+                    close(&format!("{name}, Lemke"), solve(&p)[i][axis], impulse);
+                }
                 for method in methods {
                     let found = by(method)[i][axis];
                     assert!((found - impulse).abs() < 1e-11, "{name}, {method:?}: {found} is not {impulse}");
@@ -408,8 +391,7 @@ mod tests {
             }
         }
         let v = machine().velocities(&solve(&machine()));
-        close("motor", v[0][2], 0.02);
-        close("limit", v[1][2], -1e-4 / H);
+        assert!((v[0][2] - 0.02).abs() < 1e-11 && (v[1][2] + 1e-4 / H).abs() < 1e-11, "{v:?}");
     }
 
     /// Large columns, mass ratios, pyramids; hyperstatic planks and a rod on two identical hinges.
@@ -432,34 +414,12 @@ mod tests {
         let mut p = pendulum_rod(0.0);
         p.joints.push(p.joints[0].clone());
         let l = solve(&p);
-        close("hinges", l[1][0] + l[3][0], load / 4.0);
+        assert!((l[1][0] + l[3][0] - load / 4.0).abs() < 1e-11, "{l:?}");
         assert_eq!(reference(&p).unwrap().certificate.uniqueness, Uniqueness::Proven);
         // 21 boxes fall at 1/24 m/s; rest to rounding.
         let p = box_pyramid(6, 0.6);
         assert!(p.contacts.len() > 100 && p.contacts.len() < 150, "{}", p.contacts.len());
         assert!(p.mass_norm(&p.velocities(&solve(&p))) < 1e-13);
-    }
-
-    #[test]
-    fn blocks_stick_and_discs_roll_up_to_their_angles() {
-        let slope: f64 = 0.25;
-        let (sin, cos, tan) = (slope.sin(), slope.cos(), slope.tan());
-        for (factor, sticks) in [(1.0 + 1e-9, true), (1.0 - 1e-9, false)] {
-            let p = block_on_incline(slope, factor * tan);
-            let v = p.velocities(&solve(&p))[0];
-            let slides = p.h * GRAVITY * (sin - factor * tan * cos).max(0.0);
-            // The gain near the threshold is 1e-11 m/s, still 10⁵ roundings of v*.
-            assert!((v[0] + slides).abs() < 1e-15, "{v:?} {slides:e}");
-            assert_eq!(v[0].abs() < 1e-12, sticks);
-        }
-        let third = tan / 3.0;
-        for (mu, rolls) in [(third * (1.0 + 1e-9), true), (third * (1.0 - 1e-6), false), (0.05, false)] {
-            let p = disc_on_incline(slope, mu);
-            let v = p.velocities(&solve(&p))[0];
-            let gain = if rolls { 2.0 / 3.0 * sin } else { sin - mu * cos };
-            close("disc", v[0], -p.h * GRAVITY * gain);
-            assert_eq!((v[0] + 0.5 * v[2]).abs() < 1e-14, rolls, "{v:?}");
-        }
     }
 
     #[test]

@@ -9,8 +9,6 @@ use serde::{Deserialize, Serialize};
 pub const ROWS: usize = 3;
 /// One number per row of a block; zero for absent rows.
 pub type RowVector = [f64; ROWS];
-/// Damping (1) below which the impulse of a spring follows from its error alone, whatever its velocity.
-pub(super) const UNDAMPED: f64 = 1e-12;
 
 /// A joint of a problem.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -37,56 +35,7 @@ pub struct ProblemBlock {
 }
 
 /// The law of a block; see [`super::joints`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum BlockLaw {
-    /// C = 0.
-    Rigid,
-    /// C ≥ 0, for a single row.
-    Limit,
-    /// J v = u.
-    Motor {
-        /// u (m/s or rad/s)
-        speed: f64,
-        /// F h (N·s or N·m·s)
-        cap: f64,
-    },
-    /// A spring.
-    Spring {
-        /// S (1/s)
-        stiffness: f64,
-        /// D (1)
-        damping: f64,
-        /// F h (N·s or N·m·s); `None` if unbounded.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        cap: Option<f64>,
-    },
-}
-
-impl From<RowLaw<f32>> for BlockLaw {
-    fn from(law: RowLaw<f32>) -> Self {
-        match law {
-            RowLaw::Rigid => BlockLaw::Rigid,
-            RowLaw::Limit => BlockLaw::Limit,
-            RowLaw::Motor { speed, cap } => BlockLaw::Motor { speed: speed.into(), cap: cap.into() },
-            RowLaw::Spring { stiffness, damping, cap } => {
-                let cap = cap.map(f64::from);
-                BlockLaw::Spring { stiffness: stiffness.into(), damping: damping.into(), cap }
-            }
-        }
-    }
-}
-
-impl BlockLaw {
-    /// Largest norm of its impulses; `None` if unbounded.
-    pub fn cap(&self) -> Option<f64> {
-        match *self {
-            BlockLaw::Motor { cap, .. } => Some(cap),
-            BlockLaw::Spring { cap, .. } => cap,
-            BlockLaw::Rigid | BlockLaw::Limit => None,
-        }
-    }
-}
+pub type BlockLaw = RowLaw<f64>;
 
 /// A row of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -134,33 +83,6 @@ impl ProblemJoint {
     }
 }
 
-/// Bounds of the impulses of a block.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum BlockBound {
-    None,
-    /// λ ≥ 0
-    Positive,
-    /// Largest norm.
-    Cap(f64),
-}
-
-impl BlockBound {
-    /// Π; NaN stays NaN.
-    pub fn project(self, mut y: RowVector) -> RowVector {
-        match self {
-            BlockBound::None => {}
-            BlockBound::Positive => y[0] = positive(y[0]),
-            BlockBound::Cap(cap) => {
-                let norm = y.iter().map(|y| y * y).sum::<f64>().sqrt();
-                if norm > cap {
-                    y = y.map(|y| y * (cap / norm));
-                }
-            }
-        }
-        y
-    }
-}
-
 /// The law of a block as a line in the velocity; see [`super::joints`].
 #[derive(Clone, Debug)]
 pub struct LawLine {
@@ -168,14 +90,12 @@ pub struct LawLine {
     pub size: usize,
     /// K
     pub(super) response: [RowVector; ROWS],
-    /// K⁻¹
-    inverse: [RowVector; ROWS],
     /// P of [`Self::solution`], initially K⁻¹.
     pub(super) step: [RowVector; ROWS],
     /// α = q
     pub(super) alpha: f64,
     offset: RowVector,
-    pub(super) bound: BlockBound,
+    law: BlockLaw,
 }
 
 impl LawLine {
@@ -201,18 +121,8 @@ impl LawLine {
                 BlockLaw::Spring { stiffness, damping, .. } => stiffness / (1.0 + damping) * errors[i],
             };
         }
-        let bound = match (law, law.cap()) {
-            (BlockLaw::Limit, _) => BlockBound::Positive,
-            (_, Some(cap)) => BlockBound::Cap(cap),
-            (_, None) => BlockBound::None,
-        };
-        let inverse = inverted(response, size).unwrap_or_default();
-        LawLine { size, response, inverse, step: inverse, alpha, offset, bound }
-    }
-
-    /// K⁻¹ x
-    fn solved(&self, x: RowVector) -> RowVector {
-        product(&self.inverse, x)
+        let step = inverted(response, size).unwrap_or_default();
+        LawLine { size, response, step, alpha, offset, law }
     }
 
     /// Π(y), y = λ − P (c + q J v + (1 − α) K λ): the impulses that satisfy the block alone, at the velocity
@@ -221,22 +131,19 @@ impl LawLine {
         let soft = product(&self.response, l);
         let f = [0, 1, 2].map(|i| self.offset[i] + self.alpha * u[i] + (1.0 - self.alpha) * soft[i]);
         let x = product(&self.step, f);
-        self.bound.project([0, 1, 2].map(|i| l[i] - x[i]))
+        self.project([0, 1, 2].map(|i| l[i] - x[i]))
     }
 
-    /// Impulses of a spring whose force does not depend on the velocity.
-    pub(super) fn fixed(&self) -> Option<RowVector> {
-        (self.alpha < UNDAMPED).then(|| self.bound.project(self.solved(self.offset).map(|x| -x)))
-    }
-
-    /// b of J v + b + R λ = 0 (m/s or rad/s).
-    pub(super) fn bias(&self) -> RowVector {
-        self.offset.map(|c| c / self.alpha)
-    }
-
-    /// R = `softness` K (1).
-    pub(super) fn softness(&self) -> f64 {
-        (1.0 - self.alpha) / self.alpha
+    /// Π; NaN stays NaN.
+    fn project(&self, y: RowVector) -> RowVector {
+        match (self.law, self.law.cap()) {
+            (BlockLaw::Limit, _) => [positive(y[0]), y[1], y[2]],
+            (_, Some(cap)) => {
+                let norm = y.iter().map(|y| y * y).sum::<f64>().sqrt();
+                if norm > cap { y.map(|y| y * (cap / norm)) } else { y }
+            }
+            (_, None) => y,
+        }
     }
 }
 

@@ -1,10 +1,6 @@
 //! C11: an arch of 17 stones that only friction and its own weight hold up.
 
-use super::holds::Demand;
-use super::parts::ground_line;
-use super::tolerance::Tolerances;
-use super::truth::stands;
-use super::{Entry, Scene, SceneBody, SceneShape};
+use super::parts::*;
 
 /// Right half of the inner curve, from the ground up, before scaling.
 const INNER: [[f64; 2]; 9] = [

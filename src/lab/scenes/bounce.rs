@@ -8,16 +8,8 @@
 //! sampling. The rest is the solver's own error: when in the step it applies restitution, and how much energy
 //! that adds or removes.
 
-use super::holds::Demand;
-use super::parts::ground_line;
-use super::tolerance::Tolerances;
-use super::truth::{Observer, Truth, View, largest};
-use super::{Entry, Scene, SceneBody, SceneShape};
-use crate::engine::params::{DEFAULT_GRAVITY, RESTITUTION_THRESHOLD};
-use crate::engine::world::World;
-
-/// m/s²
-const G: f64 = -DEFAULT_GRAVITY[1];
+use super::parts::*;
+use crate::engine::params::RESTITUTION_THRESHOLD;
 
 /// m
 const RADIUS: f64 = 0.5;
@@ -103,63 +95,5 @@ impl Observer for Apexes {
         }
         let found = self.found.iter().copied().chain(std::iter::repeat(0.0));
         Some(largest(self.expected.iter().zip(found).map(|(e, f)| (f - e).abs())))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::lab::scenes::truth::by_hand;
-
-    /// Semi-implicit Euler at 1/256 s, bouncing at the end of a substep below ground.
-    /// The exact variant puts the ball where Q is e² times its value before.
-    fn run(height: f64, restitution: f64, steps: u64, exact: bool) -> Apexes {
-        let mut apexes = Apexes::new(
-            steps,
-            (1..=counted(height, restitution)).map(|k| height * restitution.powi(2 * k as i32)).collect(),
-        );
-        let mut bodies = by_hand::bodies(&[[0.0, 0.0], [0.0, 0.0]]);
-        let (h, mut y, mut v) = (1.0 / 256.0, height, 0.0_f64);
-        for step in 1..=steps {
-            for _ in 0..4 {
-                v -= G * h;
-                y += h * v;
-                if y <= 0.0 && v < -1.0 {
-                    let q = y + v * v / (2.0 * G) - 0.5 * v * h;
-                    v *= -restitution;
-                    if exact {
-                        y = restitution * restitution * q - v * v / (2.0 * G) + 0.5 * v * h;
-                    }
-                } else if y <= 0.0 {
-                    (y, v) = (0.0, 0.0);
-                }
-            }
-            (bodies.position_y[1], bodies.velocity_y[1]) = ((y + RADIUS) as f32, v as f32);
-            apexes.see(&by_hand::view(&bodies, step));
-        }
-        apexes
-    }
-
-    #[test]
-    fn four_impacts_from_ten_meters_are_fast_enough() {
-        assert_eq!(counted(10.0, 0.5), 4);
-    }
-
-    #[test]
-    fn apexes_that_are_right_have_no_error() {
-        let apexes = run(10.0, 0.5, 320, true);
-        assert_eq!(apexes.found.len(), 4);
-        // y up to 3 m and v²/2g from f32: a few times 1e-7.
-        assert!(apexes.error().unwrap() < 1e-6, "{:?}", apexes.found);
-        assert_eq!(run(10.0, 0.5, 320, false).error().map(|e| e > 1e-3), Some(true));
-    }
-
-    #[test]
-    fn bounces_that_never_come_count_as_zero() {
-        let mut apexes = Apexes::new(1, vec![2.5, 0.625]);
-        assert_eq!(apexes.error(), None);
-        let bodies = by_hand::bodies(&[[0.0, 0.0], [0.0, 0.5]]);
-        apexes.see(&by_hand::view(&bodies, 1));
-        assert_eq!(apexes.error(), Some(2.5));
     }
 }

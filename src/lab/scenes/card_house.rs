@@ -8,11 +8,7 @@
 //! lowest feet start in the ground. Two tips are 4.2 mm apart, so each moves 2.1 mm in and 2.1 tan 25° = 1 mm
 //! down. Together this is 22 mm.
 
-use super::holds::Demand;
-use super::tolerance::Tolerances;
-use super::truth::stands;
-use super::{Entry, Scene, SceneBody, SceneShape};
-use std::f64::consts::FRAC_PI_2;
+use super::parts::*;
 
 pub(super) const HOUSE: Entry = Entry::new("card_house", "a house of 40 cards, five levels high", |_| {
     let card = |x: f64, y: f64, angle: f64| {

@@ -1,10 +1,7 @@
 //! Chains: bridges, ropes and beams of links.
 
-use super::holds::Demand;
 use super::linked::{damped, gaps, link, pin};
-use super::tolerance::Tolerances;
-use super::truth::{Truth, Worst, greatest_drop, rests_at};
-use super::{Entry, Scene, SceneBody, SceneJoint, SceneShape};
+use super::parts::*;
 use crate::engine::joints::{JointKind, Weld};
 
 /// Limit on the gap of joints of 1 m links (m).

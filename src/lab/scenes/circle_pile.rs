@@ -1,7 +1,6 @@
 //! A box of discs of many sizes, in any number that a speed study needs.
 
-use super::tolerance::Tolerances;
-use super::{Entry, Scene, SceneBody, SceneShape};
+use super::parts::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 

@@ -4,10 +4,7 @@
 //! velocities along it and keep those across it: the target leaves with v cos φ = 0.8 v along the line, the
 //! other with v sin φ = 0.6 v across it.
 
-use super::holds::Demand;
-use super::tolerance::Tolerances;
-use super::truth::{Truth, View, Worst, largest};
-use super::{Entry, Scene, SceneBody, SceneShape};
+use super::parts::*;
 
 /// Initial speed (m/s): twice the restitution threshold of 1 m/s. The approach along the normal is 0.8 of it;
 /// at 1 m/s the collision would be plastic.
@@ -41,24 +38,4 @@ fn error(view: &View) -> f64 {
         (x.hypot(y) - speed).abs()
     };
     largest([off(0, 0.6 * SPEED), off(1, 0.8 * SPEED)])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::lab::scenes::truth::by_hand;
-
-    #[test]
-    fn the_exact_outcome_has_no_error_and_a_miss_has() {
-        let mut bodies = by_hand::bodies(&[[0.0, 0.0], [1.0, 0.0]]);
-        // Normal (0.8, 0.6): the target gets 1.6 along it, the other keeps 1.2 along (0.6, −0.8).
-        (bodies.velocity_x[0], bodies.velocity_y[0]) = (0.72, -0.96);
-        (bodies.velocity_x[1], bodies.velocity_y[1]) = (1.28, 0.96);
-        assert!(error(&by_hand::view(&bodies, 50)) < 1e-7);
-        (bodies.velocity_x[0], bodies.velocity_y[0]) = (2.0, 0.0);
-        (bodies.velocity_x[1], bodies.velocity_y[1]) = (0.0, 0.0);
-        assert_eq!(error(&by_hand::view(&bodies, 50)), 1.6);
-        bodies.velocity_x[0] = f32::NAN;
-        assert_eq!(error(&by_hand::view(&bodies, 50)), f64::INFINITY);
-    }
 }

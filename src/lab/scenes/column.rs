@@ -1,11 +1,6 @@
 //! B1, B5, C8, C15: columns of discs and of boxes.
 
-use super::holds::Demand;
-use super::parts::{ground_box, ground_line};
-use super::tolerance::Tolerances;
-use super::truth::rests_at;
-use super::{Entry, Scene, SceneBody, SceneShape};
-use std::f64::consts::PI;
+use super::parts::*;
 
 /// One contact per pair, so every impulse is known: contact i (0 is the ground) carries (N − i) m g. The
 /// discs are exactly centered, so nothing makes them roll off.

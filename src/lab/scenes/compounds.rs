@@ -1,10 +1,6 @@
 //! D: bodies of two crossed triangles each, dropped into a yard.
 
-use super::holds::{Contained, Demand};
-use super::parts::{above_floor, yard};
-use super::tolerance::Tolerances;
-use super::truth::none_outside;
-use super::{Entry, Geometry, Scene, SceneBody, SceneShape, SegmentGeometry};
+use super::parts::*;
 
 pub(super) const COMPOUNDS: Entry =
     Entry::new("compounds", "3000 bodies of two triangles each, in a box", |_| {

@@ -1,8 +1,6 @@
 //! C12: a row of dominoes.
 
-use super::parts::ground_box;
-use super::tolerance::Tolerances;
-use super::{Entry, Scene, SceneBody, SceneShape};
+use super::parts::*;
 
 /// Half width and half height (m).
 const HALF: [f64; 2] = [0.125, 0.5];

@@ -6,13 +6,8 @@
 //! near one.
 
 use super::column::column;
-use super::holds::Demand;
-use super::parts::ground_box;
-use super::tolerance::Tolerances;
-use super::truth::{Observer, Truth, largest};
-use super::{Entry, Scene, SceneShape};
+use super::parts::*;
 use crate::engine::bodies::Bodies;
-use crate::engine::world::World;
 
 pub(super) const STACK: Entry =
     Entry::new("far_stack", "ten boxes, a power of ten from the origin", |exponent| {
@@ -79,7 +74,7 @@ fn distance(near: &Bodies, far: &Bodies, shift: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::scenes::truth::by_hand::bodies;
+    use by_hand::bodies;
 
     #[test]
     fn every_coordinate_of_the_far_stack_is_a_float() {

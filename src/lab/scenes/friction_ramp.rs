@@ -7,11 +7,7 @@
 //! −0.588, −0.089, 1.104 and 2.474 m/s². From 2 s to 2.5 s all five slide flush on the
 //! first ramp.
 
-use super::parts::ground_line;
-use super::tolerance::Tolerances;
-use super::truth::{Truth, View, Worst, largest};
-use super::{Entry, Scene, SceneBody, SceneShape};
-use crate::engine::params::DEFAULT_GRAVITY;
+use super::parts::*;
 
 /// Index of the first box.
 const FIRST: usize = 6;
@@ -47,7 +43,7 @@ pub(super) const RAMP: Entry =
     })
     .within(|scene, _| {
         // The box at x = 1 m starts at 28 m, over a ramp that is 21 m high there.
-        let downhill = 0.01 * -DEFAULT_GRAVITY[1] * SLOPE.sin();
+        let downhill = 0.01 * G * SLOPE.sin();
         Tolerances::impacts(scene).truth(downhill, "1 % of gravity along the ramp")
     });
 
@@ -80,7 +76,7 @@ impl Slide {
             return None;
         }
         let errors = (0..5).map(|i| {
-            let exact = -DEFAULT_GRAVITY[1] * (sin - self.mixed[i] * cos);
+            let exact = G * (sin - self.mixed[i] * cos);
             ((speeds[i] - start[i]) / (view.time() - since) - exact).abs()
         });
         Some(largest(errors))
@@ -90,7 +86,6 @@ impl Slide {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::scenes::truth::by_hand;
 
     #[test]
     fn the_error_is_the_worst_of_five_accelerations() {

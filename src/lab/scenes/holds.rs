@@ -33,12 +33,7 @@ impl Mark {
 
     /// Word for tables.
     pub fn word(self) -> &'static str {
-        match self {
-            Mark::Fell => "fell",
-            Mark::Slid => "slid",
-            Mark::Tunneled => "tunneled",
-            Mark::BlewUp => "blew up",
-        }
+        ["fell", "slid", "tunneled", "blew up"][self as usize]
     }
 }
 

@@ -7,11 +7,7 @@
 //! Each substep changes the velocity by exactly a h, hence
 //! [`View::accelerated`] gives the discrete distance.
 
-use super::holds::Demand;
-use super::tolerance::Tolerances;
-use super::truth::{Truth, View, Worst};
-use super::{Entry, Scene, SceneBody, SceneShape};
-use crate::engine::params::DEFAULT_GRAVITY;
+use super::parts::*;
 
 /// rad
 const SLOPE: f64 = 0.25;
@@ -44,9 +40,6 @@ pub(super) const SLIPPING_DISC: Entry =
     .known(|scene, _| truth("distance slid, all steps", slipping(0.05), end_time(scene)))
     .within(|scene, way| Tolerances::standard(scene).percent(way));
 
-/// m/s²
-const G: f64 = -DEFAULT_GRAVITY[1];
-
 fn slipping(friction: f64) -> f64 {
     G * (SLOPE.sin() - friction * SLOPE.cos())
 }
@@ -75,29 +68,4 @@ fn truth(quantity: &'static str, a: f64, time: f64) -> Truth {
 fn downhill(view: &View) -> f64 {
     let [x, y] = view.center(1);
     x * SLOPE.cos() - y * SLOPE.sin()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::lab::scenes::truth::by_hand;
-
-    #[test]
-    fn accelerations_are_those_of_the_literature() {
-        assert!((slipping(0.24) - 0.148650).abs() < 1e-6);
-        assert!((slipping(0.05) - 1.989583).abs() < 1e-6);
-        assert!((2.0 / 3.0 * G * SLOPE.sin() - 1.649360).abs() < 1e-6);
-    }
-
-    #[test]
-    fn the_start_is_zero_and_a_meter_is_a_meter() {
-        let (sin, cos) = (SLOPE.sin(), SLOPE.cos());
-        let at = |d: f64| {
-            let body = [(0.5 * sin + d * cos) as f32, (0.5 * cos - d * sin) as f32];
-            downhill(&by_hand::view(&by_hand::bodies(&[[0.0, 0.0], body]), 1))
-        };
-        // Coordinates below 1 m, rounded to f32.
-        assert!(at(0.0).abs() < 6e-8);
-        assert!((at(1.0) - 1.0).abs() < 1.2e-7);
-    }
 }

@@ -1,12 +1,6 @@
 //! D: a yard full of pentagons, and a pusher that plows through them.
 
-use super::holds::{Contained, Demand};
-use super::parts::{above_floor, yard};
-use super::tolerance::Tolerances;
-use super::truth::none_outside;
-use super::{Entry, Scene, SceneBody, SceneShape};
-use crate::engine::bodies::BodyKind;
-use std::f64::consts::{PI, TAU};
+use super::parts::*;
 
 pub(super) const JUNKYARD: Entry = Entry::new("junkyard", "8000 pentagons and a pusher in a box", |_| {
     // A scene has no script, so the pusher does not swing as x = 60 sin(0.2 t) but covers the same distance,

@@ -1,10 +1,8 @@
 //! Known values of scenes with joints, and their building blocks.
 
-use super::format::{Capsule, Geometry, Scene, SceneBody, SceneShape};
-use super::holds::energies;
-use super::truth::{Observer, Truth};
+use super::parts::*;
 use crate::engine::solvers::{DEFAULT, find};
-use crate::engine::world::{Settings, World};
+use crate::engine::world::Settings;
 
 /// A small static pin at `at` (m), in the group of bodies that do not collide.
 pub(super) fn pin(at: [f64; 2]) -> SceneBody {
@@ -83,7 +81,6 @@ impl Observer for Energy {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::scenes::SceneJoint;
 
     fn world() -> (Scene, World) {
         let bob = SceneBody::dynamic([1.0, 0.0], SceneShape::disc(0.1));

@@ -1,14 +1,8 @@
 //! Machines: many joints at once, motors, springs and limits.
 
-use super::holds::{Contained, Demand};
 use super::linked::{gaps, link};
-use super::parts::{above_floor, ground_line};
-use super::tolerance::Tolerances;
-use super::truth::{Truth, View, Worst};
-use super::{Capsule, Entry, Geometry, Rectangle, Scene, SceneBody, SceneJoint, SceneShape};
-use crate::engine::bodies::BodyKind;
+use super::parts::*;
 use crate::engine::joints::{JointKind, Motor, Prismatic, Revolute, Spring, Weld, Wheel};
-use std::f64::consts::{PI, TAU};
 
 /// Box2D's joint grid: discs that do not collide, each hinged to the one above and the one on its left.
 pub(super) const GRID: Entry =
@@ -87,7 +81,7 @@ pub(super) const CRANE: Entry =
         for i in 0..10 {
             let y = 8.55 - 0.5 * f64::from(i);
             let at = SceneBody::dynamic([2.5, y], link(0.25, 0.05).density(17.0));
-            bodies.push(at.turned(-std::f64::consts::FRAC_PI_2));
+            bodies.push(at.turned(-FRAC_PI_2));
             let anchor = if i == 0 { [0.0, -0.2] } else { [0.25, 0.0] };
             joints.push(SceneJoint::revolute(i as usize + 2, i as usize + 3, anchor, [-0.25, 0.0]));
         }

@@ -1,11 +1,6 @@
 //! B4, C3, C4: heavy bodies on light ones.
 
-use super::holds::Demand;
-use super::parts::ground_line;
-use super::tolerance::Tolerances;
-use super::truth::{Truth, View, Worst, ground_load, rests_at, rests_on_ground, weight};
-use super::{Entry, MASS_RATIO, Scene, SceneBody, SceneShape};
-use std::f64::consts::PI;
+use super::parts::*;
 
 pub(super) const PAIR: Entry = Entry::new("mass_ratio", "a heavy disc on a disc of 1 kg", |ratio| {
     let disc = |mass: f64| SceneShape::disc(0.5).density(4.0 * mass / PI);
@@ -78,9 +73,7 @@ pub(super) const LARGE_ON_SMALL: Entry =
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::bodies::BodyKind;
     use crate::engine::contacts::{Contact, Manifold};
-    use crate::lab::scenes::truth::by_hand;
     use glam::Vec2;
 
     #[test]

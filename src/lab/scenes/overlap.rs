@@ -1,10 +1,6 @@
 //! C7: boxes that start overlapping by a quarter.
 
-use super::holds::Demand;
-use super::parts::ground_line;
-use super::tolerance::Tolerances;
-use super::truth::rests_on_ground;
-use super::{Entry, Scene, SceneBody, SceneShape};
+use super::parts::*;
 
 /// Wherever the boxes are pushed, the ground carries their weight once they rest.
 pub(super) const RECOVERY: Entry =

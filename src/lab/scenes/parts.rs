@@ -1,10 +1,20 @@
-//! Helpers for building scenes.
+//! What scenes are built from: every file of a scene uses all of it.
 
-use super::format::*;
-use super::joints::SceneJoint;
-use super::truth::View;
-use crate::engine::bodies::BodyKind;
+pub(super) use super::format::*;
+pub(super) use super::holds::{Contained, Demand, energies};
+pub(super) use super::joints::SceneJoint;
+pub(super) use super::tolerance::Tolerances;
+#[cfg(test)]
+pub(super) use super::truth::by_hand;
+pub(super) use super::truth::*;
+pub(super) use super::{Entry, MASS_RATIO};
+pub(super) use crate::engine::bodies::BodyKind;
 use crate::engine::params::{DEFAULT_DENSITY, DEFAULT_DT, DEFAULT_FRICTION, DEFAULT_GRAVITY};
+pub(super) use crate::engine::world::World;
+pub(super) use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI, TAU};
+
+/// Gravity (m/s²).
+pub(super) const G: f64 = -DEFAULT_GRAVITY[1];
 
 impl Scene {
     /// A scene with default gravity, step and length.
@@ -156,7 +166,6 @@ pub(super) fn above_floor(view: &View, i: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::scenes::truth::{by_hand, outside};
 
     #[test]
     fn below_the_floor_are_dynamic_bodies_and_nan() {

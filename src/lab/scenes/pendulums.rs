@@ -1,11 +1,7 @@
 //! Pendulums and linkages: motion without losses.
 
-use super::holds::Demand;
 use super::linked::{energy, pin};
-use super::tolerance::Tolerances;
-use super::truth::{Truth, Worst, weight};
-use super::{Entry, Scene, SceneBody, SceneJoint, SceneShape};
-use std::f64::consts::FRAC_PI_3;
+use super::parts::*;
 
 /// A rod of 1 m and 0.1 m² that hangs from `top` at an angle (rad) from its lowest position, and does not
 /// collide.

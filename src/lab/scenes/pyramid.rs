@@ -1,7 +1,6 @@
 //! B7, C9 and D: pyramids of boxes.
 
-use super::parts::ground_box;
-use super::{Entry, Scene, SceneBody, SceneShape};
+use super::parts::*;
 
 pub(super) const PYRAMID: Entry = Entry::new("pyramid", "a pyramid of boxes", |base| scene("pyramid", base))
     .sized(10, 1, 1000, "boxes in the lowest row")

@@ -1,11 +1,8 @@
 //! Ragdolls: Solver2D's human of eleven capsules and ten hinges with limits and friction.
 
-use super::holds::{Contained, Demand};
 use super::linked::gaps;
-use super::tolerance::Tolerances;
-use super::{Capsule, Entry, Geometry, Scene, SceneBody, SceneJoint, SceneShape};
+use super::parts::*;
 use crate::engine::joints::{JointKind, Motor, Revolute, Spring};
-use std::f64::consts::PI;
 
 /// A bone: its parent, height of its middle (m), lower and upper end (m from there), radius (m), height of
 /// the hinge to the parent (m), limits of the angle (π), friction of the hinge (as a multiple of

@@ -1,9 +1,6 @@
 //! C1: one box dropped on flat ground.
 
-use super::parts::ground_line;
-use super::tolerance::Tolerances;
-use super::truth::rests_at;
-use super::{Entry, Scene, SceneBody, SceneShape};
+use super::parts::*;
 
 pub(super) const DROP: Entry = Entry::new("single_box", "a box dropped from three meters", |_| {
     let mut ground = ground_line(66.0);

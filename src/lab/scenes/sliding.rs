@@ -1,13 +1,6 @@
 //! A2 and A4: a box and a disc that slide on flat ground.
 
-use super::parts::ground_line;
-use super::tolerance::Tolerances;
-use super::truth::{Truth, View, Worst};
-use super::{Entry, Scene, SceneBody, SceneShape};
-use crate::engine::params::DEFAULT_GRAVITY;
-
-/// m/s²
-const G: f64 = -DEFAULT_GRAVITY[1];
+use super::parts::*;
 
 /// m/s
 const BOX_SPEED: f64 = 3.0;
@@ -57,41 +50,4 @@ fn scene(name: &str, shape: SceneShape, speed: f64, friction: f64) -> Scene {
     ground.shapes[0].friction = friction;
     let body = SceneBody::dynamic([0.0, 0.5], shape.friction(friction)).moving([speed, 0.0], 0.0);
     Scene::new(name, vec![ground, body]).steps(120)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::engine::bodies::Bodies;
-    use crate::lab::scenes::truth::by_hand;
-
-    #[test]
-    fn the_discrete_distance_is_the_sum_until_it_stops() {
-        let none = Bodies::default();
-        let (mut v, mut x) = (BOX_SPEED, 0.0);
-        for step in 1..=120 {
-            let view = by_hand::view(&none, step);
-            for _ in 0..4 {
-                v = f64::max(0.0, v - BOX_FRICTION * G * view.h());
-                x += view.h() * v;
-            }
-            assert!((slid(&view) - x).abs() < 1e-12, "step {step}");
-        }
-        // It has stopped, v0 h/2 = 0.006 m short of the continuous 1.5 m.
-        assert_eq!(v, 0.0);
-        assert!((x - 1.5 + 0.5 * BOX_SPEED / 256.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn the_speed_counts_only_once_it_rolls() {
-        let scene = (ROLL.build)(0);
-        let off = |view: &View| Some(view.velocity(1)[0] - 2.0 / 3.0 * DISC_SPEED);
-        let mut worst = Worst::from_time(&scene, 1.0, off);
-        let mut bodies = by_hand::bodies(&[[0.0, 0.0], [0.0, 0.5]]);
-        worst.see(&by_hand::view(&bodies, 59));
-        bodies.velocity_x[1] = 3.5;
-        worst.see(&by_hand::view(&bodies, 60));
-        use crate::lab::scenes::Observer;
-        assert!((worst.error().unwrap() - (3.5 - 10.0 / 3.0)).abs() < 1e-15);
-    }
 }

@@ -1,8 +1,6 @@
 //! D: a heavy block flies into a wall of small boxes, without gravity.
 
-use super::tolerance::Tolerances;
-use super::truth::{Truth, View, Worst};
-use super::{Entry, Scene, SceneBody, SceneShape};
+use super::parts::*;
 
 pub(super) const SMASH: Entry = Entry::new("smash", "a heavy block flies into 9600 boxes", |_| {
     let block = SceneBody::dynamic([-20.0, 0.0], SceneShape::rectangle(4.0, 4.0).density(8.0))
@@ -40,7 +38,6 @@ fn momentum(view: &View) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::scenes::truth::by_hand;
 
     #[test]
     fn momentum_is_the_sum_of_mass_times_velocity() {

@@ -1,10 +1,6 @@
 //! D: a turning square drum, half full of small boxes.
 
-use super::holds::{Contained, Demand};
-use super::tolerance::Tolerances;
-use super::truth::{View, none_outside};
-use super::{Entry, Scene, SceneBody, SceneShape};
-use crate::engine::bodies::BodyKind;
+use super::parts::*;
 
 /// Distance from the drum's center to the middle of its walls (m), which are 1 m thick.
 const REACH: f64 = 10.0;
@@ -42,7 +38,6 @@ fn inside(view: &View, i: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::scenes::truth::{by_hand, outside};
 
     #[test]
     fn the_escaped_are_those_outside_the_turned_square() {

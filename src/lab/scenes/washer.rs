@@ -1,10 +1,6 @@
 //! D: a turning drum with four lobes, full of small boxes.
 
-use super::holds::{Contained, Demand};
-use super::tolerance::Tolerances;
-use super::truth::{View, none_outside};
-use super::{Entry, Scene, SceneBody, SceneShape};
-use crate::engine::bodies::BodyKind;
+use super::parts::*;
 
 /// Radii of the lobes' inside, the wall's inside and the wall's outside (m).
 const RADII: [f64; 3] = [14.0, 16.0, 18.0];
@@ -55,7 +51,6 @@ fn inside(view: &View, i: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::scenes::truth::{by_hand, outside};
 
     #[test]
     fn the_escaped_are_those_beyond_the_wall() {

@@ -11,11 +11,10 @@ use super::search::LEVELS;
 use crate::engine::world::Settings;
 use crate::lab::error::Error;
 use crate::lab::metrics::rest::REST_WINDOW;
+use crate::lab::parallel::{in_parallel, processors};
 use crate::lab::scenes::Scene;
 use crate::lab::scenes::holds::{Broken, Demand, HORIZON, Mark};
 use crate::lab::trial::Trial;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Runs a scene that should come to rest for [`HORIZON`], or for its own steps if that is longer, under its demands.
 ///
@@ -36,34 +35,6 @@ pub fn later(scene: &Scene, demands: &[Demand], settings: Settings) -> Result<La
     let broken = diverged.or(found.broken);
     let rest_speed_m_s = found.errors.filter(|_| broken.is_none()).map(|e| e.rest_velocity());
     Ok(Later { steps, seconds: steps as f64 * scene.dt, broken, rest_speed_m_s })
-}
-
-/// Calls `work` for each item of a list, on all cores. Results are in the order of the list.
-pub fn in_parallel<T: Sync, R: Send>(
-    list: &[T],
-    work: impl Fn(&T) -> Result<R, Error> + Sync,
-) -> Result<Vec<R>, Error> {
-    let next = AtomicUsize::new(0);
-    let slots: Vec<Mutex<Option<Result<R, Error>>>> = list.iter().map(|_| Mutex::new(None)).collect();
-    let go = || {
-        while let Some((item, slot)) = {
-            let i = next.fetch_add(1, Ordering::Relaxed);
-            list.get(i).zip(slots.get(i))
-        } {
-            let result = work(item);
-            if let Ok(mut slot) = slot.lock() {
-                *slot = Some(result);
-            }
-        }
-    };
-    let threads = std::thread::available_parallelism().map_or(1, |n| n.get()).min(list.len());
-    std::thread::scope(|scope| {
-        for _ in 1..threads {
-            scope.spawn(go);
-        }
-        go();
-    });
-    slots.into_iter().filter_map(|slot| slot.into_inner().ok().flatten()).collect()
 }
 
 /// Extends the settings of a scene that an answer at some accuracy would name, until every named setting has
@@ -93,7 +64,7 @@ pub fn run_on(
         }
         tell(format!("extending {} to a minute: {} settings", scene.name, untried.len()));
         let untried: Vec<Record> = untried.into_iter().cloned().collect();
-        let found = in_parallel(&untried, |record| later(scene, demands, record.settings()?))?;
+        let found = in_parallel(&untried, processors(), |record| later(scene, demands, record.settings()?))?;
         for (record, later) in untried.iter().zip(found) {
             records.iter_mut().filter(|r| same(r, record)).for_each(|r| r.later = Some(later));
         }
@@ -122,16 +93,5 @@ mod tests {
         let stands = run("shim", 1);
         assert_eq!((stands.broken, stands.steps), (None, 3600));
         assert!(stands.rest_speed_m_s.is_some_and(|speed| speed < 5e-3), "{stands:?}");
-    }
-
-    #[test]
-    fn results_keep_the_order_of_the_list() {
-        let list: Vec<u32> = (0..50).collect();
-        assert_eq!(
-            in_parallel(&list, |&n| Ok(n * n)).unwrap(),
-            list.iter().map(|n| n * n).collect::<Vec<_>>()
-        );
-        let failed = in_parallel(&list, |&n| if n == 7 { Err(Error::invalid("n", "7")) } else { Ok(n) });
-        assert!(failed.is_err());
     }
 }

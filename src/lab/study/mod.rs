@@ -44,13 +44,13 @@ use crate::engine::world::{Divergence, Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::metrics::Errors;
 use crate::lab::overrides;
+use crate::lab::parallel::{in_parallel, processors};
 use crate::lab::scenes::class::SceneClass;
 use crate::lab::scenes::holds::Broken;
 use crate::lab::scenes::{Loaded, Scene};
 use crate::lab::trial::{Trial, TrialOutcome};
 use compare::Ratio;
 use found::{Found, FoundBudgets, TunedBudget};
-use horizon::in_parallel;
 use interleave::Interleaved;
 pub use plan::{StudyPlan, is_path, open_scene};
 pub use record::{FailedAt, Fronts, Record, TruthError, mark_fronts};
@@ -209,7 +209,7 @@ fn scene_records(
     let jobs: Vec<(&ErrorCell, Order)> =
         cells.iter().flat_map(|cell| plan.orders.iter().map(move |&order| (cell, order))).collect();
     let (done, total) = (AtomicUsize::new(0), (jobs.len() + 1).max(2) as f64);
-    let outcomes = in_parallel(&jobs, |&(cell, order)| {
+    let outcomes = in_parallel(&jobs, processors(), |&(cell, order)| {
         let share = done.fetch_add(1, Ordering::Relaxed) as f64 / total;
         tell(0.5 * share, format!("errors {name} · {} · {}", cell.solver.name, cell.text()));
         let width = match order {

@@ -14,6 +14,7 @@ use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::memory;
 use crate::lab::overrides::{self, Override};
+use crate::lab::parallel::processors;
 use crate::lab::scenes::holds::Demand;
 use crate::lab::scenes::tolerance::{GivenTolerances, Tolerance, Tolerances};
 use crate::lab::scenes::{self, Loaded, Scene};
@@ -144,7 +145,7 @@ impl StudyPlan {
                 * self.impacts_on(&scene).len()
                 * self.frozen.len()
                 * (self.widths.len() + self.orders.len());
-            let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
+            let threads = processors();
             memory::check(name, scene.bodies.len(), worlds, threads)?;
             if self.solvers.iter().all(|solver| scene.runs_on(solver).is_err()) {
                 scene.runs_on(self.solvers[0])?;

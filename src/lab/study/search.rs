@@ -22,7 +22,7 @@
 //! runs.
 
 use super::found::{FoundBudgets, TunedBudget};
-use super::horizon::{in_parallel, later};
+use super::horizon::later;
 use super::{ErrorCell, FailedAt, Record, RecordRow, StudyPlan};
 use super::{leave_out_unseen, observe_until_broken, record_of, settings};
 use crate::engine::constraints::Impacts;
@@ -32,6 +32,7 @@ use crate::engine::params::{Budget, Parameter, Parameters};
 use crate::engine::solvers::Variant;
 use crate::engine::world::Order;
 use crate::lab::error::Error;
+use crate::lab::parallel::{in_parallel, processors};
 use crate::lab::scenes::holds::Demand;
 use crate::lab::scenes::tolerance::Accuracy;
 use crate::lab::scenes::{Loaded, Scene};
@@ -103,7 +104,7 @@ pub fn search(
         })
         .collect();
     let (done, total) = (AtomicUsize::new(0), jobs.len() as f64);
-    in_parallel(&jobs, |job| {
+    in_parallel(&jobs, processors(), |job| {
         let share = done.fetch_add(1, Ordering::Relaxed) as f64 / total;
         tell(share, format!("searching {name} · {}", job.solver.name));
         let candidates = job.best()?;

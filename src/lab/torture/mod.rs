@@ -105,15 +105,7 @@ impl TortureVerdict {
 
     /// Word for tables.
     pub fn word(self) -> &'static str {
-        match self {
-            TortureVerdict::Diverged => "diverged",
-            TortureVerdict::Energy => "energy",
-            TortureVerdict::Flung => "flung",
-            TortureVerdict::Escaped => "escaped",
-            TortureVerdict::Sunk => "sunk",
-            TortureVerdict::Apart => "apart",
-            TortureVerdict::Restless => "restless",
-        }
+        ["diverged", "energy", "flung", "escaped", "sunk", "apart", "restless"][self as usize]
     }
 }
 

@@ -7,13 +7,13 @@ pub(super) use crate::engine::world::World;
 pub(super) use crate::lab::scenes::{Geometry, Scene, SceneBody, SceneJoint, SceneShape, largest};
 pub(super) use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, FRAC_PI_4, PI, TAU};
 
-use super::{ParameterSweep, SweepRow};
 use crate::engine::constraints::Impacts;
 use crate::engine::params::{CONTACT_HERTZ, DEFAULT_GRAVITY, LINEAR_SLOP, Without};
 use crate::engine::solvers::Variant;
 use crate::engine::world::Settings;
 use crate::lab::scenes;
 pub(super) use crate::lab::scenes::holds::energies;
+use crate::lab::units::number;
 use std::ops::Range;
 
 /// What a case measures.
@@ -400,24 +400,25 @@ pub(super) fn threshold(
 }
 
 /// Tries the values of a parameter in order. The measured value is the last one before the first failure (0
-/// if the first value fails); the reference value is the last of all. `hold` returns a number for the table
+/// if the first value fails); the reference value is the last of all. `hold` returns a number for the note
 /// and whether it is good enough. A diverged run counts as a failure.
 pub(super) fn sweep(
     parameter: &'static str,
     values: &[f64],
     mut hold: impl FnMut(f64) -> Result<(f64, bool), Failure>,
 ) -> Measured {
-    let mut rows = Vec::new();
+    let (mut held, mut all_hold, mut each) = (0.0, true, Vec::new());
     for &value in values {
         let (measured, holds) = match hold(value) {
             Err(Failure::Diverged(_)) => (f64::INFINITY, false),
             other => other?,
         };
-        rows.push(SweepRow { value, measured, holds });
+        all_hold &= holds;
+        held = if all_hold { value } else { held };
+        each.push(format!("{}: {}{}", number(value), if holds { "" } else { "FAIL " }, number(measured)));
     }
-    let held = rows.iter().take_while(|row| row.holds).last().map_or(0.0, |row| row.value);
     let all = values.last().copied().unwrap_or(0.0);
-    Ok(Finding { sweep: Some(ParameterSweep { parameter, rows }), ..Finding::new(held, all, 0.0) })
+    Ok(Finding::new(held, all, 0.0).note(format!("{parameter} {}", each.join(", "))))
 }
 
 /// Ground at height 0 with the given friction: a line of half length `half` (m).
@@ -531,11 +532,5 @@ mod tests {
         assert!((depth - 0.01).abs() < 1e-9);
         assert!((soft - 15.0 * 1.25 / (TAU * 60.0).powi(2)).abs() < 1e-8);
         assert_eq!(overlap_ratio(&world), depth / SLOP.max(soft));
-    }
-
-    #[test]
-    fn downhill_is_along_the_plank() {
-        assert!((downhill([2.0 * 0.3f64.cos(), -2.0 * 0.3f64.sin()], 0.3) - 2.0).abs() < 1e-15);
-        assert_eq!(downhill([0.3f64.sin(), 0.3f64.cos()], 0.3), 0.0);
     }
 }

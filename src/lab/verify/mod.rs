@@ -223,46 +223,19 @@ pub struct Finding {
     pub truth: f64,
     /// The tolerance, ≥ 0.
     pub tolerance: f64,
-    /// Further remarks, often empty.
+    /// Further remarks, often empty. If the reference value is a threshold: what was measured at each value tried.
     pub note: String,
-    /// If the reference value is a threshold, the sweep that found it.
-    pub sweep: Option<ParameterSweep>,
-}
-
-/// Results of a sweep over one parameter.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct ParameterSweep {
-    /// Name and unit of the parameter.
-    pub parameter: &'static str,
-    /// One row per value, in the order tried.
-    pub rows: Vec<SweepRow>,
-}
-
-/// A row of a [`ParameterSweep`].
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct SweepRow {
-    /// Value of the parameter.
-    pub value: f64,
-    /// The measured value; infinite if the run diverged.
-    pub measured: f64,
-    /// Whether the measured value is good enough.
-    pub holds: bool,
 }
 
 impl Finding {
     /// A measured value with its reference value and tolerance.
     pub fn new(measured: f64, truth: f64, tolerance: f64) -> Self {
-        Finding { measured, truth, tolerance, note: String::new(), sweep: None }
+        Finding { measured, truth, tolerance, note: String::new() }
     }
 
     /// Adds a remark.
     pub fn note(self, note: impl Into<String>) -> Self {
         Finding { note: note.into(), ..self }
-    }
-
-    /// The rows of its sweep.
-    fn rows(&self) -> impl Iterator<Item = &SweepRow> {
-        self.sweep.iter().flat_map(|sweep| &sweep.rows)
     }
 
     /// Distance to the reference value; infinite if the measured value is not a number.

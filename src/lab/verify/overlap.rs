@@ -247,26 +247,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn recovery_has_the_rate_and_the_time_of_the_list() {
-        let h = 1.0 / 240.0;
-        // Without the term of gravity, the factor is 0.929267 below the speed limit, which is reached at
-        // 0.17672 m.
-        let rate = |d: f64| (recovered(d, h) - recovered(0.0, h)) / d;
-        assert!((rate(0.1) - 0.929267).abs() < 1e-6);
-        assert!((rate(0.1767) - 0.929267).abs() < 1e-6 && rate(0.1768) > 0.92928);
-        let mut substeps = 0;
-        let mut depth = 0.25;
-        while depth > 0.005 {
-            depth = recovered(depth, h);
-            substeps += 1;
-        }
-        assert_eq!(substeps, 55);
-        // The depth at rest is g/ω².
-        let rest = (0..1000).fold(depth, |d, _| recovered(d, h));
-        assert!((rest - soft_depth(G, 1.0, true)).abs() < 1e-12);
-    }
-
-    #[test]
     fn shares_count_overlaps_only() {
         assert_eq!(share([0.1, 0.3, -5.0, 0.2].into_iter()), 0.3 / (0.6000000000000001 / 3.0));
         assert_eq!(share([-1.0].into_iter()), f64::INFINITY);

@@ -271,24 +271,3 @@ fn watch(world: &mut World, seconds: f64) -> Result<[f64; 3], Failure> {
 fn moves(world: &mut World, seconds: f64) -> Measured {
     Ok(Finding::new(watch(world, seconds)?[1], 0.0, SLOP))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::engine::contacts::{Manifold, ManifoldPoint};
-    use crate::engine::solvers;
-    use glam::Vec2;
-
-    #[test]
-    fn a_plank_is_borne_by_sum_and_moment() {
-        let lab = Lab::new(solvers::find("pgs").unwrap());
-        let mut world = lab.world(lab.scene("stack:1").unwrap()).unwrap();
-        let at = |x: f32| ManifoldPoint { anchor_b: Vec2::new(x, -0.5), ..Default::default() };
-        let manifold = Manifold { normal: Vec2::Y, count: 2, points: [at(-1.0), at(2.0)] };
-        let step_impulse = [[3.0, 1.0], [1.0, 0.0]];
-        world.contacts = vec![Contact { body_a: 0, body_b: 1, manifold, step_impulse, ..Default::default() }];
-        // Normals −1·3 + 2·1; the friction impulse 1 along (1, 0) acts half a meter below: +0.5.
-        assert_eq!(bearing(&world, 1), [4.0, -0.5]);
-        assert_eq!(bearing(&world, 0)[0], -4.0);
-    }
-}

@@ -3,7 +3,8 @@
 use super::{CASES, Case, Failure, Finding, Lab};
 use crate::engine::solvers::Variant;
 use crate::lab::error::Error;
-use std::sync::Mutex;
+use crate::lab::parallel::in_parallel;
+use std::convert::Infallible;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Result of one case with one solver.
@@ -81,32 +82,16 @@ pub fn run(
     lab: impl Fn(&'static Variant) -> Lab + Sync,
     tell: &(dyn Fn(usize, usize, &str) + Sync),
 ) -> VerifyMatrix {
-    let total = cases.len() * solvers.len();
-    let slots: Vec<Mutex<Cell>> = (0..total).map(|_| Mutex::new(Cell::Foreign)).collect();
-    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let work = || {
-        loop {
-            let i = next.fetch_add(1, Ordering::Relaxed);
-            if i >= total {
-                return;
-            }
-            let (case, solver) = (cases[i / solvers.len()], solvers[i % solvers.len()]);
-            tell(done.load(Ordering::Relaxed), total, &format!("{} with {}", case.id, solver.name));
-            let cell = judge(case, &lab(solver), solver);
-            // A panicking thread aborts the whole scope, so no poisoned slot is ever read.
-            if let Ok(mut slot) = slots[i].lock() {
-                *slot = cell;
-            }
-            done.fetch_add(1, Ordering::Relaxed);
-        }
-    };
-    std::thread::scope(|scope| {
-        for _ in 1..threads.clamp(1, total.max(1)) {
-            scope.spawn(work);
-        }
-        work();
+    let each = |&case: &&'static Case| solvers.iter().map(move |&solver| (case, solver)).collect::<Vec<_>>();
+    let jobs: Vec<_> = cases.iter().flat_map(each).collect();
+    let done = AtomicUsize::new(0);
+    let Ok(cells) = in_parallel(&jobs, threads, |&(case, solver)| {
+        tell(done.load(Ordering::Relaxed), jobs.len(), &format!("{} with {}", case.id, solver.name));
+        let cell = judge(case, &lab(solver), solver);
+        done.fetch_add(1, Ordering::Relaxed);
+        Ok::<_, Infallible>(cell)
     });
-    let mut all = slots.into_iter().map(|slot| slot.into_inner().unwrap_or(Cell::Foreign));
+    let mut all = cells.into_iter();
     let cells = cases.iter().map(|_| all.by_ref().take(solvers.len()).collect()).collect();
     VerifyMatrix { cases, solvers, cells }
 }

@@ -21,9 +21,6 @@
 //! A is scaled by S = 1/√G_ii on both sides of impulse rows, and by the inverse on σ: G gets a unit
 //! diagonal whatever the masses, the 1s stay 1, and µ becomes µ √(G_tt/G_nn). q is divided by its largest
 //! entry, so that tolerances have a fixed scale: the problem is homogeneous in (z, q).
-//!
-//! A row with its own bounds, |λ| ≤ c, is a tangential row with the number c instead of µ λn: the last line
-//! becomes 0 ≤ σ ⊥ c − β⁺ − β⁻ ≥ 0. A row with λ ≥ 0 is a point without friction.
 
 use crate::constraints::numerics::lemke::{LemkeOutcome, lemke};
 use crate::constraints::numerics::matrix::Matrix;
@@ -40,9 +37,8 @@ pub struct CoulombLcp {
     unit: f64,
     /// 1/√G_ii
     scale: Vec<DPair>,
-    /// Rows of G with two-sided bounds: tangential rows of points with friction, then rows with bounds of
-    /// their own.
-    bounded: Vec<usize>,
+    /// Points with friction.
+    frictional: Vec<usize>,
 }
 
 impl CoulombLcp {
@@ -54,33 +50,19 @@ impl CoulombLcp {
         free: &[DPair],
         g: impl Fn(usize, usize) -> f64,
     ) -> Self {
-        Self::with_caps(friction, &[], diagonal, free, g)
-    }
-
-    /// As [`Self::new`], with rows of |λ| ≤ `caps` (N·s) after those of points. Each has one row of G. Every
-    /// two of them share a pair of `diagonal` and `free`.
-    pub fn with_caps(
-        friction: &[f64],
-        caps: &[f64],
-        diagonal: &[DPair],
-        free: &[DPair],
-        g: impl Fn(usize, usize) -> f64,
-    ) -> Self {
         let points = friction.len();
         let frictional: Vec<usize> = (0..points).filter(|&i| friction[i] > 0.0).collect();
-        let of_points = frictional.iter().map(|i| 2 * i + 1);
-        let bounded: Vec<usize> = of_points.chain((0..caps.len()).map(|k| 2 * points + k)).collect();
-        let sided = bounded.len();
+        let sided = frictional.len();
         let n = points + 3 * sided;
         let scale: Vec<DPair> = diagonal.iter().map(|g| g.map(|g| 1.0 / g.sqrt())).collect();
-        // Normal rows of all points; then β⁺ and β⁻ of each two-sided row; then σ.
+        // Normal rows of all points; then β⁺ and β⁻ of each point with friction; then σ.
         // An impulse row is a row of G and a sign; a σ row has neither.
         let impulse_row = |row: usize| {
             if row < points {
                 Some((2 * row, 1.0))
             } else if row < points + 2 * sided {
                 let k = row - points;
-                Some((bounded[k / 2], if k.is_multiple_of(2) { 1.0 } else { -1.0 }))
+                Some((2 * frictional[k / 2] + 1, if k.is_multiple_of(2) { 1.0 } else { -1.0 }))
             } else {
                 None
             }
@@ -97,33 +79,27 @@ impl CoulombLcp {
                 *q = sign * scaled(i) * free[i / 2][i % 2];
             }
         }
-        for (k, &i) in bounded.iter().enumerate() {
+        for (k, &point) in frictional.iter().enumerate() {
             for beta in [points + 2 * k, points + 2 * k + 1] {
                 a[(beta, slip(k))] = 1.0;
                 a[(slip(k), beta)] = -1.0;
             }
-            if let Some(&point) = frictional.get(k) {
-                a[(slip(k), point)] = friction[point] * scale[point][0] / scale[point][1];
-            } else {
-                q[slip(k)] = caps[k - frictional.len()] / scaled(i);
-            }
+            a[(slip(k), point)] = friction[point] * scale[point][0] / scale[point][1];
         }
-        // Caps are not included: they may be practically infinite.
-        let unit = q[..points + 2 * sided].iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let unit = q.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         if unit > 0.0 {
             q.iter_mut().for_each(|x| *x /= unit);
         }
-        CoulombLcp { a, q, unit, scale, bounded }
+        CoulombLcp { a, q, unit, scale, frictional }
     }
 
-    /// Number of rows: one for each point, three more for each point with friction, and three for each row
-    /// with a cap.
+    /// Number of rows: one for each point, three more for each point with friction.
     pub fn rows(&self) -> usize {
         self.q.len()
     }
 
     /// (λn, λt) of all points (N·s) by Lemke's method with this covering vector and at most `pivots` pivots,
-    /// or the reason why there is no answer. The rows with caps come after the points, two in a pair.
+    /// or the reason why there is no answer.
     ///
     /// # Panics
     /// If `covering` is not [`Self::rows`] long.
@@ -132,12 +108,10 @@ impl CoulombLcp {
             LemkeOutcome::Solution(z) => z,
             other => return Err(other),
         };
-        let (scale, unit) = (&self.scale, self.unit);
-        let points = self.rows() - 3 * self.bounded.len();
-        let normal = |i: usize| if i < points { unit * scale[i][0] * z[i] } else { 0.0 };
-        let mut impulses: Vec<DPair> = (0..scale.len()).map(|i| [normal(i), 0.0]).collect();
-        for (k, &i) in self.bounded.iter().enumerate() {
-            impulses[i / 2][i % 2] = unit * scale[i / 2][i % 2] * (z[points + 2 * k] - z[points + 2 * k + 1]);
+        let (scale, unit, points) = (&self.scale, self.unit, self.scale.len());
+        let mut impulses: Vec<DPair> = (0..points).map(|i| [unit * scale[i][0] * z[i], 0.0]).collect();
+        for (k, &i) in self.frictional.iter().enumerate() {
+            impulses[i][1] = unit * scale[i][1] * (z[points + 2 * k] - z[points + 2 * k + 1]);
         }
         Ok(impulses)
     }
@@ -160,16 +134,6 @@ mod tests {
         for (along, tangent) in [(1.0, -2.0), (-1.0, 2.0), (2.0, -3.0), (-4.0, 3.0)] {
             let [normal, found] = pushed(along);
             assert!((normal - 6.0).abs() < 1e-14 && (found - tangent).abs() < 1e-14, "{along}: {found}");
-        }
-    }
-
-    /// A mass of 2 kg moves at 3 m/s against a brake of `cap` N·s: it stops, or the brake slips.
-    #[test]
-    fn a_row_with_a_cap_holds_up_to_it() {
-        for (cap, impulse) in [(10.0, -6.0), (6.5, -6.0), (2.0, -2.0), (0.0, 0.0), (1e12, -6.0)] {
-            let law = CoulombLcp::with_caps(&[], &[cap], &[[0.5, 1.0]], &[[3.0, 0.0]], |_, _| 0.5);
-            assert_eq!(law.rows(), 3);
-            assert_eq!(law.solve(&[1.0; 3], 100).unwrap(), [[impulse, 0.0]]);
         }
     }
 

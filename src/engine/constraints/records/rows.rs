@@ -4,6 +4,7 @@
 
 use crate::constraints::numerics::small::solve;
 use crate::lanes::Lanes;
+use serde::{Deserialize, Serialize};
 
 /// How the error of a row changes with velocities; see `constraints/joints/rows.rs`.
 #[derive(Clone, Copy, Debug)]
@@ -50,8 +51,9 @@ impl<L: Lanes> Jacobian<L> {
     }
 }
 
-/// The law of a block.
-#[derive(Clone, Copy, Debug)]
+/// The law of a block. `RowLaw<()>` is its kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum RowLaw<L> {
     /// C = 0.
     Rigid,
@@ -71,8 +73,33 @@ pub enum RowLaw<L> {
         /// D (1)
         damping: L,
         /// F h, if bounded.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         cap: Option<L>,
     },
+}
+
+impl<L> RowLaw<L> {
+    /// The same law with other numbers, which are asked for in the order of the fields.
+    #[inline(always)]
+    pub fn map<T>(self, mut to: impl FnMut(L) -> T) -> RowLaw<T> {
+        match self {
+            RowLaw::Rigid => RowLaw::Rigid,
+            RowLaw::Limit => RowLaw::Limit,
+            RowLaw::Motor { speed, cap } => RowLaw::Motor { speed: to(speed), cap: to(cap) },
+            RowLaw::Spring { stiffness, damping, cap } => {
+                RowLaw::Spring { stiffness: to(stiffness), damping: to(damping), cap: cap.map(to) }
+            }
+        }
+    }
+
+    /// Largest norm of its impulses; `None` if unbounded.
+    pub fn cap(self) -> Option<L> {
+        match self {
+            RowLaw::Motor { cap, .. } => Some(cap),
+            RowLaw::Spring { cap, .. } => cap,
+            RowLaw::Rigid | RowLaw::Limit => None,
+        }
+    }
 }
 
 /// One block of one joint at the present state of its bodies, for solvers that do not use sweeps.

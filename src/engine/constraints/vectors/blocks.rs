@@ -68,10 +68,6 @@ impl RowBlock {
 
     /// Limit on the norm of its impulses, if any.
     pub fn cap(&self) -> Option<f32> {
-        match self.law {
-            RowLaw::Motor { cap, .. } => Some(cap),
-            RowLaw::Spring { cap, .. } => cap,
-            RowLaw::Rigid | RowLaw::Limit => None,
-        }
+        self.law.cap()
     }
 }
