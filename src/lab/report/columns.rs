@@ -16,7 +16,10 @@ use serde_json::Value;
 
 /// Version of `study.csv` and `study.json`. It is increased with every change that an older program cannot
 /// read.
-pub const SCHEMA: u32 = 3;
+pub const SCHEMA: u32 = 4;
+
+/// The oldest version that this program reads.
+pub const OLDEST_SCHEMA: u32 = 3;
 
 /// A column.
 #[derive(Clone, Copy, Debug)]
@@ -173,18 +176,6 @@ const VERDICT: &[(Column, StudyCell)] = &[
     cell("bits_equal", "", "whether this width gave the same bits as the error run", |r, _| {
         r.bits_equal.into()
     }),
-    cell("front_penetration", "", "whether on the Pareto front of time against penetration", |r, _| {
-        r.front.penetration.into()
-    }),
-    cell("front_residual", "", "whether on the Pareto front of time against contact-law residual", |r, _| {
-        r.front.law.into()
-    }),
-    cell(
-        "front_reference",
-        "",
-        "whether on the Pareto front of time against distance to the reference value",
-        |r, _| r.front.truth.into(),
-    ),
     cell("holds", "", "yes, or fell, slid, tunneled or blew up", |r, _| {
         r.mark().map_or("yes", |m| m.word()).into()
     }),

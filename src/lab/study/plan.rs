@@ -11,7 +11,6 @@ use crate::engine::params::Budget;
 use crate::engine::solvers::{DEFAULT, Variant, find};
 use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
-use crate::lab::files;
 use crate::lab::memory;
 use crate::lab::overrides::{self, Override};
 use crate::lab::scenes::holds::Demand;
@@ -363,7 +362,7 @@ pub fn open_scene(
     dt: Option<f64>,
 ) -> Result<Loaded, Error> {
     if is_path(name) {
-        let mut scene = Scene::from_file(files::path_of(name))?;
+        let mut scene = Scene::from_file(name)?;
         scene.steps = steps.unwrap_or(scene.steps);
         scene.dt = dt.unwrap_or(scene.dt);
         scene.validate()?;

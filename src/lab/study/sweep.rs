@@ -167,21 +167,19 @@ impl QuantitySweep {
     /// Errors: a list of several values, or a list for the swept quantity.
     pub fn check_grid(&self, grid: &BudgetGrid) -> Result<(), Error> {
         let lists = [
-            ("substeps", &grid.substeps, &[QuantityKind::Substeps][..]),
-            (
-                "velocity-iterations",
-                &grid.velocity_iterations,
-                &[QuantityKind::Velocity, QuantityKind::Iterations],
-            ),
-            ("relax-iterations", &grid.relax_iterations, &[QuantityKind::Relax]),
-            ("position-iterations", &grid.position_iterations, &[QuantityKind::Position]),
+            ("substeps", &grid.substeps),
+            ("velocity-iterations", &grid.velocity_iterations),
+            ("relax-iterations", &grid.relax_iterations),
+            ("position-iterations", &grid.position_iterations),
         ];
-        for (option, list, kinds) in lists {
+        for (option, list) in lists {
             if list.len() > 1 {
                 let message = format!("{} values, but a sweep needs one", list.len());
                 return Err(Error::invalid(format!("--{option}"), message));
             }
-            if !list.is_empty() && kinds.contains(&self.kind) {
+            let is_own = option.replace('-', "_") == self.name
+                || (self.kind == QuantityKind::Iterations && option == "velocity-iterations");
+            if !list.is_empty() && is_own {
                 return Err(Error::invalid(format!("--{option}"), format!("--sweep {} sets it", self.name)));
             }
         }
