@@ -8,7 +8,7 @@ use crate::engine::world::Order;
 use crate::lab::error::Error;
 use crate::lab::profile::waiting;
 use crate::lab::report::answer;
-use crate::lab::report::by_scene::table_of;
+use crate::lab::report::by_scene::brief_table;
 use crate::lab::report::doc::{self, DocBlock, DocTable, Tone, lines};
 use crate::lab::report::environment::Environment;
 use crate::lab::report::units::{quantity, ratio, si, si_short};
@@ -180,7 +180,7 @@ fn text(request: &Request, answer: &Answer, records: &[Record], best: Option<&Re
     }
     let (cheapest, without) = answer::cheapest(std::slice::from_ref(answer), records);
     text += &doc::text(&[DocBlock::Table(cheapest), DocBlock::Text(Tone::Plain, without)]);
-    let compared = DocTable { caption: COMPARED.into(), ..table_of(&compared(answer, records), in_advice) };
+    let compared = DocTable { caption: COMPARED.into(), ..brief_table(&compared(answer, records)) };
     text += &doc::text(&[DocBlock::Table(compared)]);
     let waited = records.iter().filter_map(|r| Some(r.sample.as_ref()?.waited)).fold(0.0, f64::max);
     text += &waiting::note(Some(waited));
@@ -209,13 +209,6 @@ fn limits(request: &Request, record: &Record) -> String {
 const COMPARED: &str = "\
 The cheapest good setting of each solver, or its nearest one; before them what is faster and not good enough, the slowest \
 of each solver";
-
-/// The columns of the comparison.
-fn in_advice(name: &str) -> bool {
-    ["budget", "lanes", "µs/step", "±", "reference", "rest speed", "verdict"].contains(&name)
-        || name.starts_with("penetration")
-        || name.starts_with("residual")
-}
 
 /// The settings of [`COMPARED`].
 fn compared<'a>(answer: &Answer<'a>, records: &'a [Record]) -> Vec<&'a Record> {

@@ -446,7 +446,7 @@ fn finish(
     let StudyFile { records, environment, .. } = study;
     let mut text = first + &doc::lines(&study.caution());
     text += &match sweep::is_sweep(records) {
-        true => sweep::head(records, environment) + &report::tables(records),
+        true => sweep::text(records, environment),
         false => answer::text(records, environment, study.steps()),
     };
     text += &doc::lines(&study.budgets());

@@ -243,7 +243,10 @@ impl Chart {
         for series in &self.series {
             for mark in series.marks.iter().filter(|mark| !mark.label.is_empty()) {
                 let at = frame.place(series, mark);
-                if let Some(place) = labels.place(at, mark.size as i32, &mark.label, &frame) {
+                if let Some((place, linked)) = labels.place(at, mark.size as i32, &mark.label, &frame) {
+                    if let Some(end) = linked {
+                        area.draw(&PathElement::new(vec![at, end], FRAME))?;
+                    }
                     write(&area, &mark.label, place, TICK, HPos::Left)?;
                 }
             }
@@ -400,27 +403,42 @@ struct Labels {
 }
 
 impl Labels {
-    /// The left end of a label next to a mark of radius `r`. `None` if there is no free place.
-    fn place(&mut self, (x, y): Pixel, r: i32, label: &str, frame: &PlotFrame) -> Option<Pixel> {
+    /// The left end of a label next to a mark of radius `r`, and, if it is far away, the end at which a line should
+    /// lead to it. `None` if there is no free place.
+    fn place(
+        &mut self,
+        (x, y): Pixel,
+        r: i32,
+        label: &str,
+        frame: &PlotFrame,
+    ) -> Option<(Pixel, Option<Pixel>)> {
         let (width, half) = (6 * label.chars().count() as i32, LABEL / 2);
         // Only a large chart has room for labels far away.
-        let far: &[i32] = if frame.chart.size[0] > 600 { &[20, 40] } else { &[] };
-        let free = |&(u, v): &Pixel| {
-            let own = [u, v - half, u + width, v + half];
-            let inside =
-                u > frame.left && own[2] < frame.right && own[1] > frame.top && own[3] < frame.bottom;
-            let apart = |t: &[i32; 4]| own[0] > t[2] || own[2] < t[0] || own[1] > t[3] || own[3] < t[1];
-            inside && self.taken.iter().all(apart)
-        };
-        let around = |away: i32| {
-            let [right, left, middle] = [x + away, x - away - width, x - width / 2];
-            let [above, below] = [y - away * 2 / 3, y + away * 2 / 3];
-            let sides = [(right, above), (right, below), (left, above), (left, below)];
-            sides.into_iter().chain([(middle, y - away - half), (middle, y + away + half)])
-        };
-        let place = std::iter::once(&(r + 3)).chain(far).flat_map(|&away| around(away)).find(free)?;
-        self.taken.push([place.0, place.1 - half, place.0 + width, place.1 + half]);
-        Some(place)
+        let most = if frame.chart.size[0] > 600 { 4 } else { 1 };
+        for away in [r + 3, 40, 80, 130].into_iter().take(most) {
+            let (near, far, slant) = (x + away, x - away - width, away * 2 / 3);
+            let places = [
+                (near, y - slant),
+                (near, y + slant),
+                (far, y - slant),
+                (far, y + slant),
+                (x - width / 2, y - away - half),
+                (x - width / 2, y + away + half),
+            ];
+            let free = |&(u, v): &Pixel| {
+                let own = [u, v - half, u + width, v + half];
+                let inside =
+                    u > frame.left && own[2] < frame.right && own[1] > frame.top && own[3] < frame.bottom;
+                let apart = |t: &[i32; 4]| own[0] > t[2] || own[2] < t[0] || own[1] > t[3] || own[3] < t[1];
+                inside && self.taken.iter().all(apart)
+            };
+            if let Some(place) = places.into_iter().find(free) {
+                self.taken.push([place.0, place.1 - half, place.0 + width, place.1 + half]);
+                let end = if place.0 < x { (place.0 + width).min(x) } else { place.0 - 2 };
+                return Some((place, (away >= 40).then_some((end, place.1))));
+            }
+        }
+        None
     }
 
     fn block(&mut self, (x, y): Pixel, r: i32) {

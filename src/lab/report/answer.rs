@@ -1,7 +1,7 @@
 //! The answer of a study on one page: which solver to use and when, the drawbacks, the best setting on each
 //! scene, which solvers fail, and what was left out.
 
-use super::by_scene::verdict;
+use super::by_scene::{self, verdict};
 use super::doc::{self, DocBlock, DocCell, DocTable, Tone};
 use super::environment::Environment;
 use super::units::{count as number, digits, is_emulated};
@@ -97,7 +97,7 @@ fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> Strin
     }
     let words = ["stay where they are placed at rest", "arrive at rest", "need not come to rest"];
     let classes = words.iter().zip(&ranking.first_in).filter(|(_, first)| !first.solvers.is_empty());
-    let classes = classes.map(|(words, first)| format!("where bodies {words} {}", first_places(first, 3)));
+    let classes = classes.map(|(words, first)| format!("{} where bodies {words}", first_places(first, 3)));
     let classes: Vec<String> = classes.collect();
     if classes.len() > 1 {
         text += &format!("  First by class of scenes: {}.", classes.join("; "));
@@ -228,7 +228,7 @@ pub fn cheapest(scenes: &[Answer], records: &[Record]) -> (DocTable, String) {
                     notes += &doc::lines(&format!(
                         "  longest is {}, {}: {}; to see it: {}\n",
                         last.solver,
-                        budget(last),
+                        by_scene::setting(last),
                         last.why_failed().unwrap_or_default(),
                         last.command_to_see(known_or_file(answer.scene))
                     ));
@@ -252,21 +252,11 @@ fn setting(record: &Record) -> [String; 5] {
     };
     [
         record.solver.to_string(),
-        budget(record),
+        by_scene::setting(record),
         time(|sample| sample.mean_ns),
         time(|sample| sample.median_ns),
         time(|sample| sample.worst_ns),
     ]
-}
-
-/// `7 sub 1 vel 1 rel @8`: the budget, with the number of lanes after `@`.
-fn budget(record: &Record) -> String {
-    let width = match record.order {
-        Order::Colored if is_emulated(record.lanes) => format!("@{} emulated", record.lanes),
-        Order::Colored => format!("@{}", record.lanes),
-        order => order.name().to_string(),
-    };
-    format!("{} {width}", record.budget_text)
 }
 
 fn percent(share: f64) -> String {
@@ -324,9 +314,10 @@ fn accuracies(scenes: &[Answer], records: &[Record]) -> DocTable {
                 Some(best) if known.is_some_and(|k| std::ptr::eq(k, best)) => {
                     cells.extend(["the same".to_string(), String::new()]);
                 }
-                Some(best) => {
-                    cells.extend([format!("{}, {}", best.solver, budget(best)), digits(best.cost_ns() / 1e3)])
-                }
+                Some(best) => cells.extend([
+                    format!("{}, {}", best.solver, by_scene::setting(best)),
+                    digits(best.cost_ns() / 1e3),
+                ]),
                 None => cells.extend(["none".to_string(), "–".to_string()]),
             }
         }

@@ -76,19 +76,38 @@ fn measured(record: &Record, show: impl Fn(&Errors) -> String) -> String {
     record.errors.as_ref().map_or(String::new(), show)
 }
 
-/// Table of the records of one scene, and notes on those that failed. In a sweep, the lines of a solver are in the
-/// order of the swept value.
-pub fn scene_table(records: &[Record]) -> (DocTable, String) {
+/// The columns of a brief table.
+const BRIEF: [&str; 10] = [
+    "budget",
+    "lanes",
+    "µs/step",
+    "longest",
+    "±",
+    "ns/contact",
+    "penetration\njudged",
+    "residual\nlighter",
+    "reference",
+    "verdict",
+];
+
+/// The records of a scene in the order of its table: in a sweep, by solver and swept value.
+pub fn in_order(records: &[Record]) -> Vec<&Record> {
     let mut lines: Vec<&Record> = records.iter().collect();
     if lines.iter().any(|r| r.swept.is_some()) {
         let value = |r: &Record| r.swept.map_or(0.0, |s| s.value);
         let place = |r: &Record| records.iter().position(|other| other.solver == r.solver);
         lines.sort_by(|a, b| place(a).cmp(&place(b)).then(value(a).total_cmp(&value(b))));
     }
+    lines
+}
+
+/// Table of the records of one scene, and notes on those that failed.
+pub fn scene_table(records: &[Record]) -> (DocTable, String) {
+    let lines = in_order(records);
     let mut notes = String::new();
     let mut previous: Option<&Record> = None;
     for &record in &lines {
-        let name = format!("{}, {}, {}", record.solver, record.budget_text, lanes(record));
+        let name = format!("{}, {}", record.solver, setting(record));
         let key = |r: &Record| (r.solver, r.budget_text.clone(), r.order);
         let same_order = previous.is_some_and(|p| key(p) == key(record));
         if let (Some(failure), false) = (record.failure, same_order) {
@@ -103,8 +122,13 @@ pub fn scene_table(records: &[Record]) -> (DocTable, String) {
     (DocTable { caption, wide: true, ..table_of(&lines, |_| true) }, notes)
 }
 
+/// Table of these records with the most important columns.
+pub fn brief_table(lines: &[&Record]) -> DocTable {
+    table_of(lines, |name| BRIEF.contains(&name))
+}
+
 /// Table of these records with the columns of these names. In a sweep, the swept value has a column.
-pub fn table_of(lines: &[&Record], keep: impl Fn(&str) -> bool) -> DocTable {
+fn table_of(lines: &[&Record], keep: impl Fn(&str) -> bool) -> DocTable {
     let swept = lines.iter().find_map(|r| r.swept).map(|s| match s.unit {
         "" => s.name.to_string(),
         unit => format!("{} ({unit})", s.name),
@@ -128,6 +152,11 @@ pub fn table_of(lines: &[&Record], keep: impl Fn(&str) -> bool) -> DocTable {
         rows.row(cells);
     }
     rows
+}
+
+/// `7 sub 1 vel 1 rel @8`: the budget, and the lanes or the order.
+pub fn setting(record: &Record) -> String {
+    format!("{} @{}", record.budget_text, lanes(record))
 }
 
 fn lanes(record: &Record) -> String {
@@ -261,8 +290,8 @@ mod tests {
         assert!(text.contains(" fell at step 100") && text.contains(" good enough"), "{text}");
         assert_eq!(text.matches("1.23 mm").count(), 4, "{text}");
         assert_eq!(text.matches(" blew up at step 7").count(), 1, "{text}");
-        assert!(text.contains("failed: pgs, 9 sub, 1: diverged at step 7: body 2 has no finite speed"));
-        assert!(text.contains("state differs from the error run: pgs, 1 sub, 8"));
+        assert!(text.contains("failed: pgs, 9 sub @1: diverged at step 7: body 2 has no finite speed"));
+        assert!(text.contains("state differs from the error run: pgs, 1 sub @8"));
         // No cell is empty.
         let columns = |line: &str| line.split("  ").filter(|cell| !cell.trim().is_empty()).count();
         let lines: Vec<usize> = text.lines().skip(3).take(4).map(columns).collect();

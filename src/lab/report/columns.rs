@@ -7,6 +7,7 @@ use super::environment::Environment;
 use crate::engine::clock::Phase;
 use crate::lab::error::Error;
 use crate::lab::metrics::METRICS;
+use crate::lab::overrides::decimal;
 use crate::lab::scenes::tolerance::Accuracy;
 use crate::lab::study::Record;
 use crate::lab::study::curve::ErrorAxis;
@@ -63,11 +64,6 @@ const fn cell(
     of: StudyCell,
 ) -> (Column, StudyCell) {
     (Column { name, unit, meaning }, of)
-}
-
-/// The shortest decimal that gives the same `f32`: 0.3, not 0.30000001.
-pub(super) fn decimal(value: f32) -> Value {
-    value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
 }
 
 /// A figure of the times, or null without times.

@@ -26,17 +26,8 @@ use doc::DocBlock;
 use std::path::{Path, PathBuf};
 use study_file::StudyFile;
 
-/// Files of a study, besides its recordings; the pictures are of earlier versions.
-const FILES: [&str; 8] = [
-    "tables.txt",
-    "study.csv",
-    study_file::NAME,
-    found::NAME,
-    html::NAME,
-    "speed_vs_error.svg",
-    "sweep.svg",
-    "profiles.svg",
-];
+/// Files of a study, besides its recordings.
+const FILES: [&str; 5] = ["tables.txt", "study.csv", study_file::NAME, found::NAME, html::NAME];
 
 /// Moves the study that a folder holds to `previous/N` below it, with the first free number N, so that no study
 /// is ever overwritten. Returns the new place; `None` if the folder holds no study.

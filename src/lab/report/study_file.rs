@@ -1,10 +1,8 @@
 //! `study.json`: all settings and measurements of a study, written and read back.
 
-use super::columns::{OLDEST_SCHEMA, SCHEMA, decimal};
+use super::columns::{OLDEST_SCHEMA, SCHEMA};
 use super::environment::Environment;
-use crate::engine::params;
-use crate::engine::solvers::Uses;
-use crate::engine::world::Settings;
+use crate::engine::solvers::Variant;
 use crate::lab::error::Error;
 use crate::lab::overrides;
 use crate::lab::study::curve::distinct;
@@ -48,32 +46,12 @@ pub struct ShardInfo {
     pub scenes: Vec<String>,
 }
 
-/// All settings of a study, chosen by the caller or constant.
+/// All settings of a study. Constants and the solvers' standard budgets are those of the commit.
 pub fn settings(plan: &StudyPlan) -> Value {
-    #[derive(serde::Serialize)]
-    struct ExportedSolver {
-        name: &'static str,
-        source: &'static str,
-        standard_budget: params::Budget,
-        uses: Uses,
-        parameters: serde_json::Map<String, Value>,
-    }
-    let solver = |v: &&'static crate::engine::solvers::Variant| ExportedSolver {
-        name: v.name,
-        source: v.source,
-        standard_budget: v.budget,
-        uses: v.uses,
-        parameters: overrides::values(v, &plan.overrides)
-            .map_or_else(|_| Default::default(), |values| overrides::by_name(v, &values)),
+    let solver = |v: &&'static Variant| {
+        let parameters = overrides::values(v, &plan.overrides).map(|values| overrides::by_name(v, &values));
+        json!({"name": v.name, "parameters": parameters.unwrap_or_default()})
     };
-    let standard = plan.solvers.first().map(|v| {
-        let s = Settings::new(v);
-        json!({
-            "broadphase": format!("{:?}", s.broadphase),
-            "integrator": s.integrator,
-            "rotation": s.rotation,
-        })
-    });
     json!({
         "scenes": plan.scenes,
         "solvers": plan.solvers.iter().map(solver).collect::<Vec<_>>(),
@@ -91,15 +69,6 @@ pub fn settings(plan: &StudyPlan) -> Value {
         "tolerance": plan.tolerances,
         "found_to_rest": plan.rests,
         "seed": plan.seed,
-        "world": standard,
-        "constants": {
-            "linear_slop_m": decimal(params::LINEAR_SLOP),
-            "speculative_distance_m": decimal(params::SPECULATIVE_DISTANCE),
-            "aabb_margin_m": decimal(params::AABB_MARGIN),
-            "restitution_threshold_m_s": decimal(params::RESTITUTION_THRESHOLD),
-            "max_position_correction_m": decimal(params::MAX_POSITION_CORRECTION),
-            "diverged_speed_m_s": decimal(params::DIVERGED_SPEED),
-        },
     })
 }
 
@@ -227,11 +196,7 @@ impl StudyFile {
     /// Contents of the file, one record per line.
     pub fn to_json(&self) -> Result<Vec<u8>, Error> {
         let failed = |e: serde_json::Error| Error::invalid(NAME, e.to_string());
-        let StudyFile { environment, command, settings, missing_scenes, parts, .. } = self.clone();
-        let schema_version = SCHEMA;
-        let records = Vec::new();
-        let head =
-            StudyFile { schema_version, environment, command, settings, missing_scenes, parts, records };
+        let head = StudyFile { schema_version: SCHEMA, records: Vec::new(), ..self.clone() };
         let head = serde_json::to_string_pretty(&head);
         let lines = self.records.iter().map(serde_json::to_string).collect::<Result<Vec<_>, _>>();
         let (head, lines) = (head.map_err(failed)?, lines.map_err(failed)?);

@@ -1,5 +1,7 @@
 //! A sweep as text: the values at which each solver is good enough.
 
+use super::by_scene::{brief_table, in_order, scene_line};
+use super::doc::{self, DocTable};
 use super::environment::Environment;
 use super::units::count;
 use crate::lab::study::Record;
@@ -11,18 +13,31 @@ pub fn is_sweep(records: &[Record]) -> bool {
     records.iter().any(|r| r.swept.is_some())
 }
 
-/// What was swept, and on which machine.
-pub fn head(records: &[Record], environment: &Environment) -> String {
-    format!(
-        "Sweep of {}: {}, {}, {} settings\n{}; {}: {} lanes per instruction\nRuns were not extended to a minute: later failures do not show.\n\n",
+const LEGEND: &str = "\
+A setting is good enough if the scene holds and its errors are within the tolerances of a plausible run (`simpulse list \
+SCENE` lists them with their reasons). Runs were not extended to a minute: later failures do not show. budget: substeps; \
+then velocity, relaxation and position sweeps per substep. µs/step: mean over the run, its longest step, ± median \
+deviation of a repeat; all settings of a scene were timed interleaved. ns/contact: mean step ÷ mean number of contacts. \
+tables.txt has every column.";
+
+/// What was swept, on which machine, and per scene where it is good enough, with a table.
+pub fn text(records: &[Record], environment: &Environment) -> String {
+    let scenes: Vec<&[Record]> = records.chunk_by(|a, b| a.scene == b.scene).collect();
+    let head = format!(
+        "Sweep of {}: {}, {}, {} settings\n{}; {}: {} lanes per instruction\n",
         records.iter().find_map(|r| r.swept).map_or("", |s| s.name),
-        count(records.chunk_by(|a, b| a.scene == b.scene).count(), "scene"),
+        count(scenes.len(), "scene"),
         count(solvers_of(records).len(), "solver"),
         records.len(),
         environment.cpu,
         environment.instructions(),
         environment.native_lanes,
-    )
+    );
+    let one = |scene: &[Record]| {
+        let table = DocTable { wide: true, ..brief_table(&in_order(scene)) };
+        format!("\n{} · {}\n{}\n{}", scene[0].scene, scene_line(scene), reached(scene), table.text())
+    };
+    format!("{head}\n{}{}", doc::lines(LEGEND), scenes.into_iter().map(one).collect::<String>())
 }
 
 fn value(record: &Record) -> f64 {

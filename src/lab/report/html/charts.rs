@@ -2,13 +2,13 @@
 
 use crate::lab::chart::scale::number;
 use crate::lab::chart::{Axis, Chart, ChartMark, FailStrip, LineStyle, Scale, Series, Style};
-use crate::lab::report::by_scene;
+use crate::lab::report::by_scene::{self, setting};
 use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, distinct, solvers_of};
 use crate::lab::study::profile::Profile;
 use crate::lab::study::search::LEVELS;
 use crate::lab::study::sweep::Swept;
 use crate::lab::study::{Record, answer};
-use crate::lab::units::{lanes, si};
+use crate::lab::units::si;
 
 /// The records of each scene.
 pub fn scenes(records: &[Record]) -> Vec<&[Record]> {
@@ -33,15 +33,7 @@ fn drawn(record: &Record, axis: ErrorAxis) -> Option<f64> {
     axis.of(record).filter(|_| record.holds()).map(|error| error.max(ERROR_FLOOR))
 }
 
-/// Budget, and order or lane width, as text.
-pub fn words(record: &Record) -> String {
-    match record.order.is_serial() {
-        true => format!("{}, {} order", record.budget_text, record.order.name()),
-        false => format!("{}, {}", record.budget_text, lanes(record.lanes)),
-    }
-}
-
-/// The same, abbreviated: `7·1·1@8`.
+/// Budget, and order or lane width, abbreviated: `7·1·1@8`.
 pub fn short_words(record: &Record) -> String {
     let numbers: Vec<&str> = record.budget_text.split(' ').filter(|w| w.parse::<u32>().is_ok()).collect();
     let width = if record.order.is_serial() { "nat".into() } else { record.lanes.to_string() };
@@ -114,7 +106,7 @@ fn precision_chart(
             let own = settings.iter().filter(|r| r.solver == solver && of(r) == kind);
             let mark = |(i, r): (usize, &&Record)| {
                 let (time, value) = (time(r)?, drawn(r, error));
-                let what = format!("{solver}, {}: {}", words(r), si(time, "s"));
+                let what = format!("{solver}, {}: {}", setting(r), si(time, "s"));
                 let error = value.map_or(String::new(), |value| shown(value, unit));
                 let mark = mark(r, [value, Some(time)], 3.2 + 0.9 * i.min(4) as f64, what, error);
                 let label = if on_front(r) { short_words(r) } else { String::new() };
@@ -157,7 +149,7 @@ pub fn overview(records: &[Record]) -> Option<Chart> {
     for solver in solvers_of(records) {
         let own = || dots.iter().filter(|d| d.0.solver == solver);
         let small = own().map(|(r, slower)| {
-            let what = format!("{solver} on {}: {}, {}× the fastest", r.scene, words(r), number(*slower));
+            let what = format!("{solver} on {}: {}, {}× the fastest", r.scene, setting(r), number(*slower));
             let error = wrong(r).map_or(String::new(), |x| format!("error {} × tolerance", number(x)));
             mark(r, [wrong(r), Some(*slower)], 2.6, what, error)
         });
@@ -236,7 +228,7 @@ fn curves<'a>(
     let series = |solver: &'static str| {
         let mark = |r: &Record| {
             let ([x, y], shown) = place(r)?;
-            Some(mark(r, [Some(x), Some(y)], 3.5, format!("{solver}, {}", words(r)), shown))
+            Some(mark(r, [Some(x), Some(y)], 3.5, format!("{solver}, {}", setting(r)), shown))
         };
         Series::line(Style::of(solver), of_solver(solver).into_iter().filter_map(mark).collect())
     };
@@ -318,7 +310,7 @@ fn sweep_chart(scene: &[Record], swept: Swept, error: Option<ErrorAxis>, unit: &
         let mut own: Vec<&&Record> = settings.iter().filter(is_own).collect();
         own.sort_by(|a, b| at(a).total_cmp(&at(b)));
         let mark = |r: &&&Record| {
-            let what = format!("{solver}, {} {} {}, {}", swept.name, number(at(r)), swept.unit, words(r));
+            let what = format!("{solver}, {} {} {}, {}", swept.name, number(at(r)), swept.unit, setting(r));
             let y = value(r);
             let text = y.map_or(String::new(), |y| if unit == "s" { si(y, "s") } else { shown(y, unit) });
             let bar = quartiles(r).filter(|_| error.is_none() && !is_dt);

@@ -90,7 +90,7 @@ fn sections(
     let records = &study.records[..];
     let solvers = solvers_of(records);
     let legend = || DocBlock::Html(legend(solvers.iter().map(|s| (*s, Style::of(s)))));
-    let machine = ("machine", "Machine, settings and command", vec![DocBlock::Html(machine(study))]);
+    let machine = ("machine", "Machine, settings and command", machine(study));
     if let Some(swept) = records.iter().find_map(|r| r.swept) {
         let lead = format!(
             "Time and errors against {}, one curve per solver. A mark is a setting at its fastest lane width; hollow marks are in natural order. Bars are the quartiles of the blocks of steps. The shaded side is within the scene’s tolerance. Settings that fail are in the strip “fails” at the top and break the curve. The settings of a scene were timed interleaved.",
@@ -248,9 +248,10 @@ fn page(study: &StudyFile, matrix: Option<&VerifyFile>, recordings: &[(Vec<u8>, 
     )
 }
 
-fn machine(study: &StudyFile) -> String {
+fn machine(study: &StudyFile) -> Vec<DocBlock> {
     let e = &study.environment;
-    let rows = [
+    let mut facts = DocTable { class: "facts", ..DocTable::new("", 2, &[]) };
+    for (name, value) in [
         ("processor", format!("{}, {} in use", e.cpu, e.processors)),
         ("system", format!("{} on {}", e.architecture, e.system)),
         ("compiler", e.compiler.clone()),
@@ -258,18 +259,12 @@ fn machine(study: &StudyFile) -> String {
         ("native lanes", e.native_lanes.to_string()),
         ("version", format!("{}, commit {}", e.version, e.commit)),
         ("command", study.command.clone()),
-    ];
-    let mut text = String::from("<table class=\"facts\"><tbody>\n");
-    for (name, value) in rows {
-        let value = escaped(&value);
-        let value = if name == "command" { format!("<code>{value}</code>") } else { value };
-        text += &format!("<tr><th>{name}<td>{value}</tr>\n");
+    ] {
+        facts.row([name.to_string(), value]);
     }
-    let settings = serde_json::to_string_pretty(&study.settings).unwrap_or_default();
-    text + &format!(
-        "</tbody></table>\n<details><summary>Every setting</summary>\n<pre>{}</pre></details>\n",
-        escaped(&settings)
-    )
+    let settings = escaped(&serde_json::to_string_pretty(&study.settings).unwrap_or_default());
+    let settings = format!("<details><summary>Every setting</summary>\n<pre>{settings}</pre></details>\n");
+    vec![DocBlock::Table(facts), DocBlock::Html(settings)]
 }
 
 #[cfg(test)]
