@@ -243,12 +243,9 @@ impl StudyPlan {
                     )
                 }
                 (broken, speed) => {
-                    let why = match (broken, speed) {
-                        (Some(broken), _) => broken.to_string(),
-                        (None, speed) => {
-                            format!("moves at {} after a minute", si(speed.unwrap_or(f64::NAN), "m/s"))
-                        }
-                    };
+                    let moves =
+                        || format!("moves at {} after a minute", si(speed.unwrap_or(f64::NAN), "m/s"));
+                    let why = broken.map_or_else(moves, |broken| broken.to_string());
                     format!(
                         "under {DEFAULT} it does not come to rest ({why}), so no rest is required: only that \
                          nothing blows up or passes through static or kinematic bodies, for its own {} steps",

@@ -367,7 +367,7 @@ mod tests {
             {"case":"A1","solver":"b","passed":false,"margin":"inf","reason":"diverged"},
             {"case":"A1","solver":"c","passed":null,"reason":"n/a"}]}"#;
         let text = doc::html(&matrix::matrix(&serde_json::from_str(json).unwrap()));
-        for part in ["A1*", ">0.50", "✗ ∞", "n/a", "measured 1, reference 1 ± 2"] {
+        for part in ["A1*", ">0.5<", "✗ ∞", "n/a", "measured 1, reference 1 ± 2"] {
             assert!(text.contains(part), "{part}: {text}");
         }
         assert!(text.contains("background:#93c1dd"), "{text}");
