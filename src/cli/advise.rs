@@ -178,7 +178,7 @@ fn text(request: &Request, answer: &Answer, records: &[Record], best: Option<&Re
         let time = si(1e-9 * fastest.cost_ns(), "s");
         text += &format!("none of the settings tried meets the limits: the fastest takes {time} a step\n");
     }
-    let (cheapest, without) = answer::cheapest(std::slice::from_ref(answer), records);
+    let (cheapest, without) = answer::cheapest(std::slice::from_ref(answer), records, scene);
     text += &doc::text(&[DocBlock::Table(cheapest), DocBlock::Text(Tone::Plain, without)]);
     let compared = DocTable { caption: COMPARED.into(), ..brief_table(&compared(answer, records)) };
     text += &doc::text(&[DocBlock::Table(compared)]);

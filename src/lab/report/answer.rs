@@ -39,7 +39,7 @@ pub fn text(records: &[Record], environment: &Environment, steps: Option<u32>) -
 pub fn blocks(records: &[Record], environment: &Environment, steps: Option<u32>) -> Vec<DocBlock> {
     let scenes: Vec<Answer> = records.chunk_by(|a, b| a.scene == b.scene).filter_map(Answer::of).collect();
     let ranking = ranking(records);
-    let (cheapest, without) = cheapest(&scenes, records);
+    let (cheapest, without) = cheapest(&scenes, records, "FILE.json");
     let plain = |text: String| DocBlock::Text(Tone::Plain, text);
     vec![
         DocBlock::Text(Tone::Lead, recommendation(&ranking, scenes.len(), steps)),
@@ -200,8 +200,9 @@ fn head(records: &[Record], environment: &Environment, scenes: usize) -> String 
     )
 }
 
-/// A table with the cheapest setting of each scene, and a line for each scene without one.
-pub fn cheapest(scenes: &[Answer], records: &[Record]) -> (DocTable, String) {
+/// A table with the cheapest setting of each scene, and a line for each scene without one; `file` is the path of a
+/// scene that is not in the catalog.
+pub fn cheapest(scenes: &[Answer], records: &[Record], file: &str) -> (DocTable, String) {
     let head = ["scene", "solver", "budget", "µs/step", "median", "longest", "next", "slower"];
     let mut rows = DocTable::new("The cheapest setting that is good enough", 3, &head);
     let mut notes = String::new();
@@ -225,24 +226,20 @@ pub fn cheapest(scenes: &[Answer], records: &[Record]) -> (DocTable, String) {
             (None, None) => {
                 notes += &format!("{}: no setting holds\n", answer.scene);
                 if let Some(last) = fails_last(records.iter().filter(|r| r.scene == answer.scene)) {
-                    notes += &doc::lines(&format!(
+                    let stem = answer.scene.split(':').next();
+                    let is_known = CATALOG.iter().any(|entry| Some(entry.name) == stem);
+                    notes += &format!(
                         "  longest is {}, {}: {}; to see it: {}\n",
                         last.solver,
                         by_scene::setting(last),
                         last.why_failed().unwrap_or_default(),
-                        last.command_to_see(known_or_file(answer.scene))
-                    ));
+                        last.command_to_see(if is_known { answer.scene } else { file })
+                    );
                 }
             }
         }
     }
     (rows, notes)
-}
-
-/// The name of a scene of the catalog; a placeholder for the file of another one.
-fn known_or_file(scene: &str) -> &str {
-    let stem = scene.split(':').next();
-    if CATALOG.iter().any(|entry| Some(entry.name) == stem) { scene } else { "FILE.json" }
 }
 
 /// Solver, budget with lanes, mean, median and longest step.
