@@ -7,12 +7,13 @@ use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::world::Order;
 use crate::lab::error::Error;
 use crate::lab::profile::waiting;
-use crate::lab::report::answer::{setting, worst, wrapped};
+use crate::lab::report::answer;
+use crate::lab::report::by_scene::brief_table;
+use crate::lab::report::doc::{self, DocBlock, DocTable, Tone, lines};
 use crate::lab::report::environment::Environment;
-use crate::lab::report::table::{error_list, finish, table};
-use crate::lab::report::units::{digits, quantity, ratio, si, si_short};
+use crate::lab::report::units::{quantity, ratio, si, si_short};
 use crate::lab::scenes::tolerance::GivenTolerances;
-use crate::lab::study::answer::{Answer, fails_last, order};
+use crate::lab::study::answer::Answer;
 use crate::lab::study::{self, Record, StudyPlan, open_scene};
 use clap::Args;
 use serde_json::json;
@@ -23,8 +24,8 @@ use std::process::ExitCode;
 /// Searches the settings of each solver as `simpulse study --thorough` does, with these limits instead of the scene's
 /// tolerances, and times up to three of each solver interleaved. If the scene has to rest, the settings in question run
 /// for a minute. A file that says nothing about what must hold is run under the default solver first: if it comes to
-/// rest there, rest is required. Prints the fastest setting that meets every limit with all its errors, faster ones
-/// that do not and why, the runners-up, and the command that runs it.
+/// rest there, rest is required. Prints the fastest setting that meets every limit, the next solver, faster settings
+/// that do not and why, and the command that runs it and prints all its errors.
 ///
 /// Exit code 0: a setting meets all limits; 1: none does, and the nearest is printed; 2: the request is invalid.
 #[derive(Args, Clone, Debug)]
@@ -162,49 +163,30 @@ pub fn run(args: &AdviseArgs) -> Result<ExitCode, Error> {
             "trials": value(&records)?,
         }))?,
         false => {
-            let text = text(&request, &answer, &records, best, nearest);
+            let text = text(&request, &answer, &records, best);
             print(&(text + &values::left_out(&request.plan.solvers)))?
         }
     };
     Ok(if best.is_some() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn text(
-    request: &Request,
-    answer: &Answer,
-    records: &[Record],
-    best: Option<&Record>,
-    nearest: Option<&Record>,
-) -> String {
+fn text(request: &Request, answer: &Answer, records: &[Record], best: Option<&Record>) -> String {
     let scene = &request.plan.scenes[0];
-    let mut text: String = request.found_out.iter().map(|line| wrapped(&format!("{line}\n"))).collect();
-    let limits = format!("limits on {scene}: {}\n\n", limits(request, &records[0]));
-    if let Some(best) = best {
-        text += &format!("{}\n\n{}", sentence(best), faster(records, best, request.max_ns));
-        text += &match answer.good.get(1) {
-            Some(next) => format!("runner-up: {}, {}\n", name(next), behind(next, best)),
-            None => "no other setting that was timed meets the limits\n".to_string(),
-        };
-        text += &limits;
-    } else if let Some(nearest) = nearest {
-        text +=
-            &format!("{limits}none of the settings tried meets the limits\n\nnearest: {}\n", name(nearest));
-        text += &format!("it {}\n\n", why_not(nearest, request.max_ns));
-    } else {
-        text += &format!("{limits}no setting holds\n");
-        if let Some(last) = fails_last(records) {
-            text += &format!("longest: {}: {}\n", name(last), why_not(last, request.max_ns));
-            text += &format!("to see it: {}\n\n", last.command_to_see(scene));
-        }
+    let mut text: String = request.found_out.iter().map(|line| lines(line)).collect();
+    text += &lines(&format!("limits on {scene}: {}", limits(request, &records[0])));
+    if let (Some(fastest), None) = (answer.best(), best) {
+        let time = si(1e-9 * fastest.cost_ns(), "s");
+        text += &format!("none of the settings tried meets the limits: the fastest takes {time} a step\n");
     }
-    if let Some(shown) = best.or(nearest) {
-        text += &evidence(shown);
-        text += &format!("\n{}", compared(answer, records, request.max_ns));
-        let waited = records.iter().filter_map(|r| Some(r.sample.as_ref()?.waited)).fold(0.0, f64::max);
-        text += &waiting::note(Some(waited));
+    let (cheapest, without) = answer::cheapest(std::slice::from_ref(answer), records, scene);
+    text += &doc::text(&[DocBlock::Table(cheapest), DocBlock::Text(Tone::Plain, without)]);
+    let compared = DocTable { caption: COMPARED.into(), ..brief_table(&compared(answer, records)) };
+    text += &doc::text(&[DocBlock::Table(compared)]);
+    let waited = records.iter().filter_map(|r| Some(r.sample.as_ref()?.waited)).fold(0.0, f64::max);
+    text += &waiting::note(Some(waited));
+    if let Some(shown) = answer.best().or(answer.nearest) {
         let steps = request.plan.steps.map_or(String::new(), |n| format!(" --steps {n}"));
-        let seed = request.plan.seed;
-        text += &format!("\nto run it: {}{steps} --seed {seed}\n", shown.command(scene));
+        text += &format!("\nto run it: {}{steps} --seed {}\n", shown.command(scene), request.plan.seed);
     }
     text
 }
@@ -213,151 +195,40 @@ fn text(
 fn limits(request: &Request, record: &Record) -> String {
     let (given, unit) = (&request.plan.tolerances, record.truth.map_or("", |t| t.unit));
     let rest = record.tolerances.rest.map(|t| t.value);
+    let max_ns = Some(request.max_ns).filter(|ns| ns.is_finite());
     let parts = [
         given.penetration.map(|p| format!("penetration ≤ {}", si_short(p, "m"))),
         given.residual.map(|r| format!("residual ≤ {}", ratio(r))),
         given.truth.map(|t| format!("distance to reference value ≤ {}", si_short(t, unit))),
         rest.map(|v| format!("stands for a minute, rest speed ≤ {}", si_short(v, "m/s"))),
-        Some(request.max_ns)
-            .filter(|ns| ns.is_finite())
-            .map(|ns| format!("time ≤ {}", si_short(1e-9 * ns, "s"))),
+        max_ns.map(|ns| format!("time ≤ {}", si_short(1e-9 * ns, "s"))),
     ];
     parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
 
-/// The advice: its cost, and its errors.
-fn sentence(best: &Record) -> String {
-    let [mean, longest] = [best.cost_ns(), best.sample.as_ref().map_or(0.0, |s| s.worst_ns)];
-    let mut text = format!(
-        "{}: {} a step (mean; longest {}).",
-        name(best),
-        si(1e-9 * mean, "s"),
-        si(1e-9 * longest, "s")
-    );
-    if let Some(errors) = &best.errors {
-        let depth = si(errors.penetration(best.tolerances.rest.is_some()), "m");
-        text += &match best.later.and_then(|later| Some((later.seconds, later.rest_speed_m_s?))) {
-            Some((seconds, speed)) => {
-                let speed = si(speed, "m/s");
-                format!(" Stands for {seconds:.0} s (checked), {depth} of penetration, {speed} at rest.")
-            }
-            None => format!(" {depth} of penetration."),
-        };
-    }
-    text
-}
+const COMPARED: &str = "\
+The cheapest good setting of each solver, or its nearest one; before them what is faster and not good enough, the slowest \
+of each solver";
 
-/// Settings that are faster but not good enough, the slowest of each solver, with the reason.
-fn faster(records: &[Record], best: &Record, max_ns: f64) -> String {
+/// The settings of [`COMPARED`].
+fn compared<'a>(answer: &Answer<'a>, records: &'a [Record]) -> Vec<&'a Record> {
+    let one_each = |list: Vec<&'a Record>, but: &[&Record]| {
+        let mut kept: Vec<&Record> = Vec::new();
+        for record in list {
+            if kept.iter().chain(but).all(|k| k.solver != record.solver) {
+                kept.push(record);
+            }
+        }
+        kept
+    };
+    let good = answer.of_each_solver();
+    let least = answer.best().map_or(0.0, Record::cost_ns);
     let mut faster: Vec<&Record> =
-        records.iter().filter(|r| r.excess() > 1.0 && r.cost_ns() < best.cost_ns()).collect();
+        records.iter().filter(|r| r.excess() > 1.0 && r.cost_ns() < least).collect();
     faster
         .sort_by(|a, b| b.later.is_some().cmp(&a.later.is_some()).then(b.cost_ns().total_cmp(&a.cost_ns())));
-    let mut rows = table(&["  rejected although faster", "µs/step", "why"]);
-    let mut solvers: Vec<&str> = Vec::new();
-    for record in faster {
-        if !solvers.contains(&record.solver) {
-            solvers.push(record.solver);
-            rows.add_row([
-                format!("  {}", name(record)),
-                digits(1e-3 * record.cost_ns()),
-                why_not(record, max_ns),
-            ]);
-        }
-    }
-    if solvers.is_empty() { String::new() } else { finish(rows, 1) + "\n" }
-}
-
-/// `soft_step, 4 sub 1 vel 1 rel @8`
-fn name(record: &Record) -> String {
-    let [solver, budget, ..] = setting(record);
-    format!("{solver}, {budget}")
-}
-
-/// Why a setting does not meet the limits.
-fn why_not(record: &Record, max_ns: f64) -> String {
-    record.why_failed().unwrap_or_else(|| match record.excess() <= 1.0 && record.cost_ns() > max_ns {
-        true => format!("takes {} a step", si(1e-9 * record.cost_ns(), "s")),
-        false => worst(record),
-    })
-}
-
-/// How much slower a setting is than the best one.
-fn behind(next: &Record, best: &Record) -> String {
-    let percent = 100.0 * (next.cost_ns() / best.cost_ns() - 1.0);
-    match order(next, best).is_eq() {
-        true => format!("tied: {percent:.1} % slower, within the noise"),
-        false => format!("{percent:.1} % slower"),
-    }
-}
-
-/// Time and errors of a setting.
-fn evidence(record: &Record) -> String {
-    let mut text = String::new();
-    if let Some(time) = &record.sample {
-        let value = format!("{} ± {} µs", digits(1e-3 * time.median_ns), digits(1e-3 * time.spread_ns));
-        text += &format!("  {:<36}{value:>12} ({} rounds)\n", "time of a step, median", time.rounds);
-    }
-    if let Some(errors) = &record.errors {
-        text += &error_list(errors);
-    }
-    if let Some(truth) = &record.truth {
-        let error = truth.error.map_or("not reached".to_string(), |e| si(e, truth.unit));
-        let known = format!("{} = {}", truth.quantity, si(truth.expected, truth.unit));
-        text += &format!("  {:<36}{error:>12} ({known})\n", "distance to reference value");
-    }
-    text
-}
-
-/// The cheapest good setting of each solver or, if it has none, its nearest one.
-fn compared(answer: &Answer, records: &[Record], max_ns: f64) -> String {
-    let good = answer.of_each_solver();
-    let mut others: Vec<&Record> = Vec::new();
-    let mut rest: Vec<&Record> =
-        records.iter().filter(|r| good.iter().all(|g| g.solver != r.solver)).collect();
-    rest.sort_by(|a, b| a.excess().total_cmp(&b.excess()));
-    for record in rest {
-        if others.iter().all(|r| r.solver != record.solver) {
-            others.push(record);
-        }
-    }
-    let mut rows = table(&[
-        "compared",
-        "µs/step",
-        "median",
-        "longest",
-        "slower",
-        "penetration",
-        "residual",
-        "reference",
-        "limits",
-    ]);
-    let first = good.first().copied();
-    for record in good.into_iter().chain(others) {
-        let [.., mean, median, longest] = setting(record);
-        let slower = match first {
-            Some(first) if !std::ptr::eq(first, record) && record.sample.is_some() => {
-                match order(record, first).is_eq() {
-                    true => "tie".to_string(),
-                    false => format!("{:.1} %", 100.0 * (record.cost_ns() / first.cost_ns() - 1.0)),
-                }
-            }
-            _ => "–".to_string(),
-        };
-        let is_met = record.excess() <= 1.0 && record.cost_ns() <= max_ns;
-        let nothing = || "–".to_string();
-        let rests = record.tolerances.rest.is_some();
-        rows.add_row([
-            name(record),
-            mean,
-            median,
-            longest,
-            slower,
-            record.errors.map_or_else(nothing, |e| si(e.penetration(rests), "m")),
-            record.errors.map_or_else(nothing, |e| ratio(e.law_rms_lighter())),
-            record.truth.map_or_else(nothing, |t| t.error.map_or("missed".into(), |e| si(e, t.unit))),
-            if is_met { "met".into() } else { why_not(record, max_ns) },
-        ]);
-    }
-    finish(rows, 1)
+    let mut others: Vec<&Record> = records.iter().collect();
+    others.sort_by(|a, b| a.excess().total_cmp(&b.excess()));
+    let (faster, others) = (one_each(faster, &[]), one_each(others, &good));
+    faster.into_iter().chain(good).chain(others).collect()
 }

@@ -123,7 +123,7 @@ fn sizes(problem: &ContactProblem) -> String {
 
 /// Runs the command.
 pub fn run(args: &ConvergeArgs) -> Result<ExitCode, Error> {
-    let path = files::path_of(&args.problem);
+    let path = Path::new(&args.problem);
     let is_frozen = args.problem.ends_with(".frozen") || path.is_file() && !args.problem.ends_with(".json");
     if let Some(file) = &args.freeze {
         if is_frozen {
@@ -146,7 +146,7 @@ pub fn run(args: &ConvergeArgs) -> Result<ExitCode, Error> {
     overrides::check(&solvers, &set)?;
     note(&overrides::partly(&solvers, &set));
     let frozen = if is_frozen {
-        Frozen::read(&path)?
+        Frozen::read(path)?
     } else {
         let (frozen, why_not) = frozen_step(&args.problem, args.step, &standard)?;
         why_not.iter().for_each(|why| note(&format!("{why}\n")));

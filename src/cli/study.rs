@@ -12,12 +12,14 @@ use crate::engine::world::Order;
 use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::overrides::{self, Override};
+use crate::lab::report::doc::{self, DocBlock};
 use crate::lab::report::study_file::{StudyFile, differing_settings, settings};
 use crate::lab::report::{self, answer, by_scene, html, sweep};
 use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::study::budget::BudgetGrid;
 use crate::lab::study::curve::distinct;
-use crate::lab::study::found::{self, Found, FoundBudgets};
+use crate::lab::study::found::{self, Found, FoundSetting};
+use crate::lab::study::record::quoted;
 use crate::lab::study::sweep::QuantitySweep;
 use crate::lab::study::{self, Progress, Record, StudyPlan, telling};
 use crate::lab::units::quantity;
@@ -127,9 +129,6 @@ pub struct StudyArgs {
     /// Each solver at half, once and twice its standard budget, whatever was found
     #[arg(long, conflicts_with = "thorough")]
     pub standard: bool,
-    /// Print the tables of every scene after the answer
-    #[arg(long)]
-    pub verbose: bool,
     /// Print JSON instead of text: what study.json holds
     #[arg(long)]
     pub json: bool,
@@ -281,8 +280,7 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     let earlier = if args.resume { Some(StudyFile::read(&args.out)?) } else { None };
     files::prepare_folder(&args.out)?;
     let lock = files::Lock::of(&args.out)?;
-    let found_out: String =
-        plan.find_out()?.iter().map(|line| answer::wrapped(&format!("{line}\n"))).collect();
+    let found_out: String = plan.find_out()?.iter().map(|line| doc::lines(line)).collect();
     let earlier = earlier.map(|earlier| resumed(earlier, &args.out, &plan)).transpose()?;
     let list = args.out.join(found::NAME);
     let found = match earlier.is_some() && plan.thorough && list.is_file() {
@@ -303,10 +301,7 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
     paths.extend(replays);
     drop(writing);
     drop(lock);
-    if args.json {
-        return print(&String::from_utf8_lossy(&study.to_json()?));
-    }
-    print(&(found_out + &text(&study, &args.out, &paths, args.verbose) + &kept_note(&results.kept)))
+    finish(args, &study, &paths, found_out, &results.kept)
 }
 
 /// The folder of a running study.
@@ -339,11 +334,11 @@ impl StudyResults<'_> {
             })?;
         }
         interrupt::say(String::new());
-        Ok(self.study(&missing))
+        self.study(&missing)
     }
 
     /// Adds the records of a scene and writes the study.
-    fn write(&mut self, records: &[Record], found: &[FoundBudgets], missing: &[String]) -> Result<(), Error> {
+    fn write(&mut self, records: &[Record], found: &[FoundSetting], missing: &[String]) -> Result<(), Error> {
         let _writing = interrupt::writing();
         if self.records.is_empty() && self.earlier.is_none() {
             self.kept = report::keep_previous(self.out)?;
@@ -353,18 +348,21 @@ impl StudyResults<'_> {
         if self.plan.thorough {
             files::write(&self.out.join(found::NAME), &self.found.to_csv()?)?;
         }
-        report::write_study(self.out, &self.study(missing))?;
+        report::write_study(self.out, &self.study(missing)?)?;
         self.say(missing);
         Ok(())
     }
 
     /// The study so far.
-    fn study(&self, missing: &[String]) -> StudyFile {
+    fn study(&self, missing: &[String]) -> Result<StudyFile, Error> {
         let missing = missing.iter().chain(&self.elsewhere).cloned().collect();
         let own = StudyFile::new(&self.plan, self.records.clone(), missing);
         match &self.earlier {
-            Some(earlier) => own.after(earlier),
-            None => own,
+            Some(earlier) => StudyFile::merged(
+                vec![earlier.clone(), own],
+                &["what was there", "what is added"].map(String::from),
+            ),
+            None => Ok(StudyFile { command: command_line(), ..own }),
         }
     }
 
@@ -378,10 +376,10 @@ impl StudyResults<'_> {
     }
 }
 
-/// A line on the study that the folder held before.
-fn kept_note(kept: &Option<PathBuf>) -> String {
-    kept.as_ref()
-        .map_or(String::new(), |place| format!("the study that was there is now in {}\n", place.display()))
+/// The command as it was given, for a shell.
+fn command_line() -> String {
+    let given = std::env::args_os().skip(1).map(|word| quoted(&word.to_string_lossy()));
+    std::iter::once("simpulse".to_string()).chain(given).collect::<Vec<_>>().join(" ")
 }
 
 /// The study of a folder, to go on with. Errors: a study with other settings.
@@ -404,7 +402,7 @@ fn resumed(earlier: StudyFile, out: &Path, plan: &StudyPlan) -> Result<StudyFile
 fn merge(args: &StudyArgs) -> Result<ExitCode, Error> {
     let parts = args.merge.iter().map(|path| StudyFile::read(path)).collect::<Result<Vec<_>, _>>()?;
     let names: Vec<String> = args.merge.iter().map(|path| path.display().to_string()).collect();
-    let whole = StudyFile::merged(parts, &names)?;
+    let whole = StudyFile { command: command_line(), ..StudyFile::merged(parts, &names)? };
     if !whole.missing_scenes.is_empty() && !args.partial {
         let missing = whole.missing_scenes.join(", ");
         let message = format!("no part has {missing}; --partial merges without it");
@@ -415,10 +413,7 @@ fn merge(args: &StudyArgs) -> Result<ExitCode, Error> {
     let _writing = interrupt::writing();
     let kept = report::keep_previous(&args.out)?;
     let paths = report::write_study(&args.out, &whole)?;
-    if args.json {
-        return print(&String::from_utf8_lossy(&whole.to_json()?));
-    }
-    print(&(text(&whole, &args.out, &paths, args.verbose) + &kept_note(&kept)))
+    finish(args, &whole, &paths, String::new(), &kept)
 }
 
 /// Drops solvers that do not have the swept quantity, and returns a message about them.
@@ -436,23 +431,34 @@ fn keep_concerned(sweep: &QuantitySweep, solvers: &mut Vec<&'static Variant>) ->
     }
 }
 
-/// The answer or, for a sweep, its curves as text; then the list of written files.
-fn text(study: &StudyFile, out: &Path, paths: &[PathBuf], verbose: bool) -> String {
-    let answer = match sweep::is_sweep(&study.records) {
-        true => sweep::text(&study.records, &study.environment),
-        false => answer::text(&study.records, &study.environment, study.steps()),
-    };
-    let mut text = answer::wrapped(&study.caution()) + &answer + &answer::wrapped(&study.budgets());
-    let mut tables = by_scene::order_tables(&study.records);
-    tables.extend(by_scene::frozen_table(&study.records));
-    text += &tables.iter().map(|t| format!("\n{}", t.text())).collect::<String>();
-    let names: Vec<String> =
-        paths.iter().filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned())).collect();
-    text += &answer::wrapped(&format!("\nwrote {} in {}\n", names.join(", "), out.display()));
-    if verbose {
-        text += &format!("\n{}", report::tables(&study.records));
+/// Prints a study as JSON, or `first`, its answer or, for a sweep, its tables, the files that were written, and where the
+/// study is that the folder held before.
+fn finish(
+    args: &StudyArgs,
+    study: &StudyFile,
+    paths: &[PathBuf],
+    first: String,
+    kept: &Option<PathBuf>,
+) -> Result<ExitCode, Error> {
+    if args.json {
+        return print(&String::from_utf8_lossy(&study.to_json()?));
     }
-    text
+    let StudyFile { records, environment, .. } = study;
+    let mut text = first + &doc::lines(&study.caution());
+    text += &match sweep::is_sweep(records) {
+        true => sweep::text(records, environment),
+        false => answer::text(records, environment, study.steps()),
+    };
+    text += &doc::lines(&study.budgets());
+    text +=
+        &doc::text(&by_scene::chosen_tables(records).into_iter().map(DocBlock::Table).collect::<Vec<_>>());
+    let names = paths.iter().filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned()));
+    let names = names.collect::<Vec<_>>().join(", ");
+    text += &doc::lines(&format!("\nwrote {names} in {}\n", args.out.display()));
+    if let Some(place) = kept {
+        text += &format!("the study that was there is now in {}\n", place.display());
+    }
+    print(&text)
 }
 
 #[cfg(test)]

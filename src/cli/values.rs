@@ -7,15 +7,12 @@ use crate::engine::params::{Budget, Parameters, Without};
 use crate::engine::solvers::{DEFAULT, VARIANTS, Variant, find};
 use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
-use crate::lab::files;
 use crate::lab::overrides::{self, Override};
 use crate::lab::scenes::CATALOG;
 use crate::lab::study::{self, DEFAULT_SCENES, DEFAULT_SOLVERS, budget, default_solvers};
 use crate::lab::units::quantity;
 use clap::Args;
-use clap::builder::{
-    NonEmptyStringValueParser, OsStringValueParser, PossibleValue, PossibleValuesParser, TypedValueParser,
-};
+use clap::builder::{NonEmptyStringValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 
 /// An element of `--solvers`.
 #[derive(Clone, Debug)]
@@ -69,12 +66,9 @@ pub fn left_out(ran: &[&'static Variant]) -> String {
     }
 }
 
-/// The parser of scenes: a name, or a path, which need not be valid UTF-8.
+/// The parser of scenes: a name, or a path.
 pub fn scene() -> impl TypedValueParser<Value = String> {
-    OsStringValueParser::new().try_map(|given| match given.is_empty() {
-        true => Err("a name or a file is required"),
-        false => Ok(files::text_of(given)),
-    })
+    NonEmptyStringValueParser::new()
 }
 
 /// Help for one scene.

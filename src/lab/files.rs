@@ -1,22 +1,18 @@
 //! Result files, written completely or not at all.
 //!
 //! A regular file is written under a temporary name in its own folder and renamed when it is complete, so an
-//! interrupted run leaves no partial file. Links are followed, and their target is replaced. Devices, pipes and
+//! interrupted run leaves no partial file. Of a link to a file, the file is replaced. Devices, pipes and
 //! `/dev/stdout` are written directly; `-` is standard output.
 //!
 //! Temporary names are kept in a list until they are gone, so that a signal can remove them
 //! ([`remove_temporaries`]).
 
 use crate::lab::error::Error;
-use std::ffi::OsString;
 use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::NamedTempFile;
-
-/// Most links followed before they count as a cycle.
-const MOST_LINKS: usize = 40;
 
 static TEMPORARIES: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
@@ -67,14 +63,11 @@ fn target(path: &Path) -> std::io::Result<FileTarget> {
     if is_standard_output(path) {
         return Ok((Box::new(std::io::stdout()), None));
     }
-    let (place, own) = followed(path)?;
+    let place = path.canonicalize().unwrap_or_else(|_| path.into());
     match std::fs::metadata(&place) {
         Ok(found) if found.is_dir() => Err(ErrorKind::IsADirectory.into()),
-        // Devices and pipes are written directly, and a regular file that is open under a system name such as
-        // `/dev/fd/3`.
-        Ok(found) if !found.is_file() || !own => {
-            Ok((Box::new(OpenOptions::new().append(true).open(&place)?), None))
-        }
+        // Devices and pipes are written directly.
+        Ok(found) if !found.is_file() => Ok((Box::new(OpenOptions::new().append(true).open(&place)?), None)),
         Ok(found) if found.permissions().readonly() => Err(ErrorKind::PermissionDenied.into()),
         _ => {
             let temporary = Temporary::in_folder(folder_of(&place))?;
@@ -90,32 +83,16 @@ pub fn is_standard_output(path: &Path) -> bool {
 
 /// Whether two paths refer to the same file.
 pub fn same_file(a: &Path, b: &Path) -> bool {
-    let place = |path: &Path| match followed(path) {
-        Ok((place, _)) => {
-            let folder = folder_of(&place).canonicalize().unwrap_or_else(|_| folder_of(&place).into());
-            folder.join(place.file_name().unwrap_or_default())
-        }
-        Err(_) => path.into(),
+    // Of a file that does not exist, its folder does.
+    let place = |path: &Path| {
+        let folder = || {
+            Ok::<_, std::io::Error>(
+                folder_of(path).canonicalize()?.join(path.file_name().unwrap_or_default()),
+            )
+        };
+        path.canonicalize().or_else(|_| folder()).unwrap_or_else(|_| path.into())
     };
     (is_standard_output(a) && is_standard_output(b)) || place(a) == place(b)
-}
-
-/// Target of the links of `path`, whether it exists or not, and whether it is an ordinary path: not one of
-/// the system's, such as `/dev/fd/3`, whose links are not paths.
-fn followed(path: &Path) -> std::io::Result<(PathBuf, bool)> {
-    const OF_THE_SYSTEM: [&str; 5] = ["/proc", "/dev/fd", "/dev/stdin", "/dev/stdout", "/dev/stderr"];
-    let of_the_system = |path: &Path| OF_THE_SYSTEM.iter().any(|folder| path.starts_with(folder));
-    let mut place = path.to_path_buf();
-    for _ in 0..MOST_LINKS {
-        if of_the_system(&place) {
-            return Ok((place, false));
-        }
-        match std::fs::read_link(&place) {
-            Ok(next) => place = folder_of(&place).join(next),
-            Err(_) => return Ok((place, true)),
-        }
-    }
-    Err(std::io::Error::other("a circle of links"))
 }
 
 fn folder_of(path: &Path) -> &Path {
@@ -233,32 +210,6 @@ impl Drop for Lock {
     }
 }
 
-/// Paths that are not valid UTF-8, with the text that represents each.
-static PATHS: Mutex<Vec<(String, PathBuf)>> = Mutex::new(Vec::new());
-
-/// Text that represents a path: names of scenes are text, but a path need not be valid UTF-8. [`path_of`]
-/// reverses this.
-pub fn text_of(path: OsString) -> String {
-    let path = match path.into_string() {
-        Ok(text) => return text,
-        Err(path) => PathBuf::from(path),
-    };
-    let mut paths = locked(&PATHS);
-    let mut text = path.to_string_lossy().into_owned();
-    // Another path may have the same text.
-    while paths.iter().any(|(known, other)| *known == text && *other != path) {
-        text.insert(0, char::REPLACEMENT_CHARACTER);
-    }
-    paths.push((text.clone(), path));
-    text
-}
-
-/// The path that a text represents.
-pub fn path_of(text: &str) -> PathBuf {
-    let paths = locked(&PATHS);
-    paths.iter().find(|(known, _)| known == text).map_or_else(|| text.into(), |(_, path)| path.clone())
-}
-
 /// Writes a whole file.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     let mut file = Pending::new(path)?;
@@ -307,20 +258,10 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn paths_that_are_no_text_are_known_again() {
-        use std::os::unix::ffi::OsStringExt;
-        let paths = [b"a\xff.json".to_vec(), b"a\xfe.json".to_vec()].map(OsString::from_vec);
-        let texts = paths.clone().map(text_of);
-        assert!(texts[0] != texts[1] && texts.iter().all(|text| text.ends_with(".json")), "{texts:?}");
-        assert_eq!(texts.map(|text| path_of(&text)), paths.map(PathBuf::from));
-        assert_eq!((text_of("b.json".into()), path_of("b.json")), ("b.json".into(), "b.json".into()));
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn links_are_followed_there_or_not() {
+    fn links_to_files_are_followed() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("file.csv"), "zero").unwrap();
         std::os::unix::fs::symlink("second", at("first")).unwrap();
         std::os::unix::fs::symlink("file.csv", at("second")).unwrap();
         for text in ["one", "two"] {
@@ -329,8 +270,6 @@ mod tests {
             assert!(at("first").is_symlink() && at("second").is_symlink());
         }
         assert!(same_file(&at("first"), &at("file.csv")) && !same_file(&at("first"), &at("other")));
-        std::os::unix::fs::symlink("round", at("round")).unwrap();
-        assert!(Pending::new(&at("round")).is_err());
     }
 
     #[cfg(target_os = "linux")]

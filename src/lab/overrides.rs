@@ -104,7 +104,7 @@ pub fn by_name(variant: &Variant, values: &Parameters) -> serde_json::Map<String
 }
 
 /// An `f32` as the shortest decimal that identifies it.
-fn decimal(value: f32) -> serde_json::Value {
+pub fn decimal(value: f32) -> serde_json::Value {
     value.to_string().parse::<f64>().map_or(serde_json::Value::Null, Into::into)
 }
 

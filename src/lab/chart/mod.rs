@@ -68,6 +68,13 @@ pub struct Axis {
     pub scale: Scale,
 }
 
+impl Axis {
+    /// An axis of this quantity.
+    pub fn new(name: impl Into<String>, scale: Scale) -> Axis {
+        Axis { name: name.into(), scale }
+    }
+}
+
 /// Where what fails is drawn: beside the end at which errors are largest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FailStrip {
@@ -178,6 +185,11 @@ struct PlotFrame<'a> {
 }
 
 impl Chart {
+    /// A chart without title, strip and tolerances.
+    pub fn new(size: [i32; 2], x: Axis, y: Axis, series: Vec<Series>) -> Chart {
+        Chart { size, title: String::new(), x, y, strip: FailStrip::None, good: [None; 2], series }
+    }
+
     /// The chart as an SVG element.
     pub fn svg(&self) -> String {
         let mut text = String::new();

@@ -85,15 +85,6 @@ impl Scale {
         Scale { log, low, high, ticks, minor: Vec::new() }
     }
 
-    /// A logarithmic axis with ticks only at these values.
-    pub fn steps(values: &[usize]) -> Scale {
-        let all: Vec<f64> = values.iter().map(|&v| v as f64).collect();
-        let low = all.iter().copied().fold(f64::INFINITY, f64::min).min(1e9);
-        let high = all.iter().copied().fold(low, f64::max);
-        let ticks = all.iter().map(|&v| (v, format!("{v}"))).collect();
-        Scale { log: true, low: low / 1.2, high: high * 1.2, ticks, minor: Vec::new() }
-    }
-
     /// Position of a value between the limits, in [0, 1].
     pub fn share(&self, value: f64) -> f64 {
         let share = match self.log {

@@ -367,16 +367,9 @@ fn key(r: &Record) -> impl PartialEq {
 fn pair(one: &Record, other: &Record) -> SettingPair {
     let errors = ErrorAxis::ALL.into_iter().filter_map(|axis| {
         let values = [axis.of(one)?, axis.of(other)?];
-        let tolerances = &one.tolerances;
-        let (error, unit, tolerance) = match axis {
-            ErrorAxis::Penetration => ("penetration", "m", tolerances.penetration.value),
-            ErrorAxis::Law => ("residual", "", tolerances.residual.value),
-            ErrorAxis::Rest => ("rest speed", "m/s", tolerances.rest.map_or(0.0, |t| t.value)),
-            ErrorAxis::Truth => {
-                ("reference", one.truth.map_or("", |t| t.unit), tolerances.truth.map_or(0.0, |t| t.value))
-            }
-        };
-        Some(ErrorChange { error, unit, values, negligible: NEGLIGIBLE * tolerance })
+        let unit = axis.unit(std::slice::from_ref(one));
+        let tolerance = axis.tolerance(&one.tolerances).map_or(0.0, |t| t.value);
+        Some(ErrorChange { error: axis.word(), unit, values, negligible: NEGLIGIBLE * tolerance })
     });
     let time = || {
         let samples = [one.sample.as_ref()?, other.sample.as_ref()?];

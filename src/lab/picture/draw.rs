@@ -10,7 +10,7 @@ use crate::engine::shapes::Shape;
 use crate::lab::units::{si, si_short};
 
 /// Color of text and frames.
-pub(super) const INK: Color = Color::rgb(0x1f2933);
+const INK: Color = Color::rgb(0x1f2933);
 const FAINT: Color = Color::rgb(0x616e7c);
 const BORDER: Color = Color::rgb(0x52606d);
 const FIXED: Color = Color::rgb(0xd3d8de);
@@ -32,8 +32,6 @@ pub const WIDTHS: [u32; 2] = [400, 8000];
 const MARGIN: f64 = 28.0;
 const HEADER: f64 = 66.0;
 const LEGEND: f64 = 84.0;
-/// Additional height for the row of joint marks.
-const JOINTS: f64 = 26.0;
 /// Smallest and largest height ÷ width of the part with the scene.
 const ASPECT: [f64; 2] = [0.3, 0.95];
 
@@ -106,9 +104,8 @@ pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u3
         bottom: HEADER + height - 0.5 * (height - scale * h),
         low,
     };
-    let legend_height = if stage.joints.is_empty() { LEGEND } else { LEGEND + JOINTS };
     let top = HEADER + height;
-    let mut drawing = Drawing::new([width, (top + legend_height).round()]);
+    let mut drawing = Drawing::new([width, (top + LEGEND).round()]);
     let size = typical(stage, scale);
     // The deepest overlap at each body.
     let mut depths = vec![0.0_f64; stage.kinds.len()];
@@ -142,13 +139,12 @@ pub fn draw(stage: &Stage, frame: &Frame, title: &str, subtitle: &str, width: u3
     let arrow = points(&mut drawing, frame, &view, size, darkest);
     // Cover shapes that reach into the header or the legend.
     drawing.rectangle([0.0, 0.0], [width, HEADER - 6.0], "#ffffff");
-    drawing.rectangle([0.0, top], [width, legend_height], "#ffffff");
+    drawing.rectangle([0.0, top], [width, LEGEND], "#ffffff");
     // Text is smaller in a narrow picture, so that no line ends outside of it.
     let fitted = |text: &str, size: f64| size.min(1.5 * inner / text.chars().count().max(1) as f64);
     drawing.text([MARGIN, 30.0], fitted(title, 21.0), "start", INK, title);
     drawing.text([MARGIN, 52.0], fitted(subtitle, 14.0), "start", FAINT, subtitle);
     legend(&mut drawing, [top, 0.25 * inner], scale, [darkest, frame.deepest()], arrow, stage.dt);
-    joints::legend(&mut drawing, &stage.joints, [MARGIN, top + LEGEND]);
     drawing.finish()
 }
 

@@ -1,14 +1,13 @@
 //! Joints as symbols: a line between the anchors, or along the axis if there is one, and a circle or a square
 //! at the anchor of body b.
 
+use super::Color;
 use super::frame::Stage;
 use super::outline::placed;
 use super::svg::Drawing;
-use super::{Color, draw::INK};
 use crate::engine::bodies::BodyKind;
 use crate::engine::joints::JointKind;
 use crate::engine::world::World;
-use std::collections::BTreeSet;
 
 /// The data of a joint that does not change while a world runs.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -111,15 +110,6 @@ fn one(drawing: &mut Drawing, mark: &str, line: [[f64; 2]; 2], q: [f64; 2], size
         "mouse" => {}
         "distance" | "spring" => drawing.disc(q, 0.3 * size, INSIDE, border, title),
         _ => drawing.disc(q, 0.5 * size, INSIDE, border, title),
-    }
-}
-
-/// The symbols of these joints with their names, in a row at this height (pixels).
-pub(super) fn legend(drawing: &mut Drawing, joints: &[JointRecord], [mut x, y]: [f64; 2]) {
-    for mark in joints.iter().map(|joint| joint.mark.as_str()).collect::<BTreeSet<_>>() {
-        one(drawing, mark, [[x, y], [x + 24.0, y]], [x + 12.0, y], 9.0, "");
-        drawing.text([x + 34.0, y + 4.0], 13.0, "start", INK, mark);
-        x += 58.0 + 7.0 * mark.len() as f64;
     }
 }
 

@@ -7,6 +7,7 @@ use super::environment::Environment;
 use crate::engine::clock::Phase;
 use crate::lab::error::Error;
 use crate::lab::metrics::METRICS;
+use crate::lab::overrides::decimal;
 use crate::lab::scenes::tolerance::Accuracy;
 use crate::lab::study::Record;
 use crate::lab::study::curve::ErrorAxis;
@@ -16,7 +17,10 @@ use serde_json::Value;
 
 /// Version of `study.csv` and `study.json`. It is increased with every change that an older program cannot
 /// read.
-pub const SCHEMA: u32 = 3;
+pub const SCHEMA: u32 = 4;
+
+/// The oldest version that this program reads.
+pub const OLDEST_SCHEMA: u32 = 3;
 
 /// A column.
 #[derive(Clone, Copy, Debug)]
@@ -60,11 +64,6 @@ const fn cell(
     of: StudyCell,
 ) -> (Column, StudyCell) {
     (Column { name, unit, meaning }, of)
-}
-
-/// The shortest decimal that gives the same `f32`: 0.3, not 0.30000001.
-pub(super) fn decimal(value: f32) -> Value {
-    value.to_string().parse::<f64>().map_or(Value::Null, Value::from)
 }
 
 /// A figure of the times, or null without times.
@@ -173,18 +172,6 @@ const VERDICT: &[(Column, StudyCell)] = &[
     cell("bits_equal", "", "whether this width gave the same bits as the error run", |r, _| {
         r.bits_equal.into()
     }),
-    cell("front_penetration", "", "whether on the Pareto front of time against penetration", |r, _| {
-        r.front.penetration.into()
-    }),
-    cell("front_residual", "", "whether on the Pareto front of time against contact-law residual", |r, _| {
-        r.front.law.into()
-    }),
-    cell(
-        "front_reference",
-        "",
-        "whether on the Pareto front of time against distance to the reference value",
-        |r, _| r.front.truth.into(),
-    ),
     cell("holds", "", "yes, or fell, slid, tunneled or blew up", |r, _| {
         r.mark().map_or("yes", |m| m.word()).into()
     }),

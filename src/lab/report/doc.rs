@@ -151,7 +151,7 @@ impl DocTable {
             0 => String::new(),
             more => format!("and {more} more in report.html\n"),
         };
-        lines(&self.caption) + &if self.rows.is_empty() { String::new() } else { body } + &more
+        lines(&self.caption) + &body + &more
     }
 
     fn html(&self) -> String {
@@ -203,6 +203,7 @@ pub fn text(blocks: &[DocBlock]) -> String {
         DocBlock::Text(Tone::Lead, text) => lines(text) + "\n",
         DocBlock::Text(Tone::Soft, text) => format!("\n{}", lines(text)),
         DocBlock::Text(_, text) => lines(text),
+        DocBlock::Table(table) if table.rows.is_empty() => String::new(),
         DocBlock::Table(table) => format!("\n{}", table.text()),
         DocBlock::Charts(..) | DocBlock::Html(_) => String::new(),
     };

@@ -1,7 +1,5 @@
 //! The machine and the compiler of a result.
 
-use std::sync::OnceLock;
-
 /// Description of machine and compiler, written with every result.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Environment {
@@ -34,8 +32,7 @@ impl Environment {
         Environment {
             cpu: cpu_model(),
             processors: std::thread::available_parallelism().map_or(1, |n| n.get()),
-            // The version is found by searching the whole program file, so it is cached.
-            compiler: COMPILER.get_or_init(compiler).clone(),
+            compiler: env!("SIMPULSE_COMPILER").into(),
             architecture: std::env::consts::ARCH.into(),
             system: std::env::consts::OS.into(),
             target_features: target_features(),
@@ -63,8 +60,6 @@ impl Environment {
     }
 }
 
-static COMPILER: OnceLock<String> = OnceLock::new();
-
 fn cpu_model() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
@@ -90,23 +85,5 @@ fn native_lanes() -> usize {
         4
     } else {
         1
-    }
-}
-
-/// The compiler writes its version into the comment section of the program. No constant of the language
-/// provides it.
-fn compiler() -> String {
-    const MARK: &[u8] = b"rustc version ";
-    let program = std::env::current_exe().and_then(std::fs::read).unwrap_or_default();
-    // This constant is in the program too, but no digit follows it.
-    let versions = program.windows(MARK.len()).enumerate().filter(|w| w.1 == MARK);
-    let mut texts = versions.map(|(at, _)| &program[at + MARK.len()..]);
-    match texts.find(|text| text.first().is_some_and(u8::is_ascii_digit)) {
-        Some(text) => {
-            let printable = text.iter().take_while(|c| (b' '..0x7f).contains(c));
-            printable
-                .fold("rustc ".to_string(), |version, &c| version + char::from(c).encode_utf8(&mut [0; 4]))
-        }
-        None => format!("rustc {} or later", env!("CARGO_PKG_RUST_VERSION")),
     }
 }

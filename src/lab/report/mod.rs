@@ -22,20 +22,12 @@ pub use crate::lab::units;
 use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::study::{Record, found};
+use doc::DocBlock;
 use std::path::{Path, PathBuf};
 use study_file::StudyFile;
 
-/// Files of a study, besides its recordings; the pictures are of earlier versions.
-const FILES: [&str; 8] = [
-    "tables.txt",
-    "study.csv",
-    study_file::NAME,
-    found::NAME,
-    html::NAME,
-    "speed_vs_error.svg",
-    "sweep.svg",
-    "profiles.svg",
-];
+/// Files of a study, besides its recordings.
+const FILES: [&str; 5] = ["tables.txt", "study.csv", study_file::NAME, found::NAME, html::NAME];
 
 /// Moves the study that a folder holds to `previous/N` below it, with the first free number N, so that no study
 /// is ever overwritten. Returns the new place; `None` if the folder holds no study.
@@ -57,18 +49,20 @@ pub fn keep_previous(folder: &Path) -> Result<Option<PathBuf>, Error> {
     Ok(Some(place))
 }
 
-/// All tables of a study: per scene, the performance profiles, and what treatments of contacts change.
+/// All tables of a study: per scene; without a sweep also what fails later, the performance profiles, and what treatments
+/// of contacts change.
 pub fn tables(records: &[Record]) -> String {
-    if sweep::is_sweep(records) {
-        return sweep::tables(records);
-    }
     let mut text = format!("{}\n", by_scene::LEGEND);
     for scene in records.chunk_by(|a, b| a.scene == b.scene) {
         let (table, notes) = by_scene::scene_table(scene);
-        text += &format!("{}{notes}\n", table.text());
+        text += &format!("{}{notes}{}\n", table.text(), sweep::reached(scene));
     }
-    text += &(answer::later_table(records) + &by_scene::profile_table(records).text());
-    text + &by_scene::treatment_tables(records).iter().map(|t| format!("\n{}", t.text())).collect::<String>()
+    if sweep::is_sweep(records) {
+        return text;
+    }
+    let tables = [answer::fail_later(records), by_scene::profile_table(records)];
+    let tables = tables.into_iter().chain(by_scene::treatment_tables(records)).map(DocBlock::Table);
+    text + &doc::text(&tables.collect::<Vec<_>>())
 }
 
 /// Writes `tables.txt`, `study.csv` and `study.json` into `folder`, and the [page](html) made from these and the

@@ -1,10 +1,8 @@
 //! `study.json`: all settings and measurements of a study, written and read back.
 
-use super::columns::{SCHEMA, decimal};
+use super::columns::{OLDEST_SCHEMA, SCHEMA};
 use super::environment::Environment;
-use crate::engine::params;
-use crate::engine::solvers::Uses;
-use crate::engine::world::Settings;
+use crate::engine::solvers::Variant;
 use crate::lab::error::Error;
 use crate::lab::overrides;
 use crate::lab::study::curve::distinct;
@@ -24,6 +22,9 @@ pub struct StudyFile {
     pub schema_version: u32,
     /// Where the study ran; for a merged study, where its first part ran.
     pub environment: Environment,
+    /// The command that ran it; empty if it was not the command line.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub command: String,
     /// All settings of the study.
     pub settings: Value,
     /// Scenes of the plan without records, because the study was interrupted or is a part of another.
@@ -45,32 +46,12 @@ pub struct ShardInfo {
     pub scenes: Vec<String>,
 }
 
-/// All settings of a study, chosen by the caller or constant.
+/// All settings of a study. Constants and the solvers' standard budgets are those of the commit.
 pub fn settings(plan: &StudyPlan) -> Value {
-    #[derive(serde::Serialize)]
-    struct ExportedSolver {
-        name: &'static str,
-        source: &'static str,
-        standard_budget: params::Budget,
-        uses: Uses,
-        parameters: serde_json::Map<String, Value>,
-    }
-    let solver = |v: &&'static crate::engine::solvers::Variant| ExportedSolver {
-        name: v.name,
-        source: v.source,
-        standard_budget: v.budget,
-        uses: v.uses,
-        parameters: overrides::values(v, &plan.overrides)
-            .map_or_else(|_| Default::default(), |values| overrides::by_name(v, &values)),
+    let solver = |v: &&'static Variant| {
+        let parameters = overrides::values(v, &plan.overrides).map(|values| overrides::by_name(v, &values));
+        json!({"name": v.name, "parameters": parameters.unwrap_or_default()})
     };
-    let standard = plan.solvers.first().map(|v| {
-        let s = Settings::new(v);
-        json!({
-            "broadphase": format!("{:?}", s.broadphase),
-            "integrator": s.integrator,
-            "rotation": s.rotation,
-        })
-    });
     json!({
         "scenes": plan.scenes,
         "solvers": plan.solvers.iter().map(solver).collect::<Vec<_>>(),
@@ -88,15 +69,6 @@ pub fn settings(plan: &StudyPlan) -> Value {
         "tolerance": plan.tolerances,
         "found_to_rest": plan.rests,
         "seed": plan.seed,
-        "world": standard,
-        "constants": {
-            "linear_slop_m": decimal(params::LINEAR_SLOP),
-            "speculative_distance_m": decimal(params::SPECULATIVE_DISTANCE),
-            "aabb_margin_m": decimal(params::AABB_MARGIN),
-            "restitution_threshold_m_s": decimal(params::RESTITUTION_THRESHOLD),
-            "max_position_correction_m": decimal(params::MAX_POSITION_CORRECTION),
-            "diverged_speed_m_s": decimal(params::DIVERGED_SPEED),
-        },
     })
 }
 
@@ -119,19 +91,12 @@ impl StudyFile {
         StudyFile {
             schema_version: SCHEMA,
             environment: Environment::current(),
+            command: String::new(),
             settings: settings(plan),
             missing_scenes,
             parts: Vec::new(),
             records,
         }
-    }
-
-    /// The rest of a study that was interrupted, together with what was finished before.
-    pub fn after(self, earlier: &StudyFile) -> StudyFile {
-        let parts = [earlier, &self].into_iter().flat_map(StudyFile::all_parts);
-        let parts = parts.filter(|part| !part.scenes.is_empty()).collect();
-        let records = earlier.records.iter().cloned().chain(self.records).collect();
-        StudyFile { environment: earlier.environment.clone(), parts, records, ..self }
     }
 
     /// Its parts; itself if it was not merged.
@@ -143,31 +108,16 @@ impl StudyFile {
     }
 
     /// Merges parts with the same settings into one study; `names` are the names of the parts in errors.
-    /// Scenes are interleaved, the first of every part first, which restores the order of a study that was
-    /// split.
     ///
     /// Errors: no parts; parts with different settings; a scene in two parts.
     pub fn merged(parts: Vec<StudyFile>, names: &[String]) -> Result<Self, Error> {
-        let chosen = |study: &StudyFile| {
-            let mut settings = study.settings.clone();
-            if let Some(map) = settings.as_object_mut() {
-                map.remove("scenes");
-                map.remove("budget_search");
-            }
-            settings
-        };
         let Some(first) = parts.first() else { return Err(Error::invalid("merge", "no parts given")) };
-        let mut whole = StudyFile {
-            schema_version: SCHEMA,
-            environment: first.environment.clone(),
-            settings: first.settings.clone(),
-            missing_scenes: Vec::new(),
-            parts: Vec::new(),
-            records: Vec::new(),
-        };
+        let mut whole =
+            StudyFile { missing_scenes: Vec::new(), parts: Vec::new(), records: Vec::new(), ..first.clone() };
         let mut found: Vec<(String, &String)> = Vec::new();
         for (part, name) in parts.iter().zip(names) {
-            if chosen(part) != chosen(first) {
+            let differs = |(name, _): &(String, [String; 2])| !["scenes", "budget_search"].contains(&&**name);
+            if differing_settings(&part.settings, &first.settings).iter().any(differs) {
                 let message = format!("{name} was run with different settings than {}", names[0]);
                 return Err(Error::invalid("merge", message));
             }
@@ -177,33 +127,25 @@ impl StudyFile {
                 }
                 found.push((scene, name));
             }
-            whole.parts.extend(part.all_parts());
+            whole.parts.extend(part.all_parts().into_iter().filter(|part| !part.scenes.is_empty()));
         }
-        let plan = |study: &StudyFile| -> Vec<String> {
-            let list = study.settings.get("scenes").and_then(Value::as_array).into_iter().flatten();
-            list.filter_map(|name| Some(name.as_str()?.to_string())).collect()
-        };
         // Scenes that a part did not finish, and scenes that no part had in its plan.
-        let finished =
-            |name: &String| parts.iter().any(|p| plan(p).contains(name) && !p.missing_scenes.contains(name));
+        let finished = |name: &String| {
+            let mut own = parts.iter().filter(|p| names_in(&p.settings["scenes"]).contains(name));
+            own.any(|p| !p.missing_scenes.contains(name))
+        };
         let missing = parts.iter().flat_map(|p| p.missing_scenes.clone());
         whole.missing_scenes = distinct(missing.filter(|name| !finished(name)));
-        let plans: Vec<Vec<String>> = parts.iter().map(plan).collect();
-        let scenes =
-            in_turns(plans.iter().map(|p| p.iter().map(|name| vec![name.clone()]).collect()).collect());
-        let not_searched = |study: &StudyFile| study.settings["budget_search"]["not_searched"].clone();
-        let others =
-            parts.iter().flat_map(|p| not_searched(p).as_array().cloned().unwrap_or_default()).collect();
-        if let Some(map) = whole.settings.as_object_mut() {
-            map.insert("scenes".into(), scenes.into());
-            if let Some(search) = map.get_mut("budget_search").and_then(Value::as_object_mut) {
-                search.insert("not_searched".into(), Value::Array(others));
-            }
-        }
-        let by_scene = |study: StudyFile| -> Vec<Vec<Record>> {
-            study.records.chunk_by(|a, b| a.scene == b.scene).map(<[Record]>::to_vec).collect()
+        let lists = |of: fn(&Value) -> &Value| {
+            let all = parts.iter().flat_map(|p| names_in(of(&p.settings)));
+            Value::from(distinct(all))
         };
-        whole.records = in_turns(parts.into_iter().map(by_scene).collect());
+        whole.settings["scenes"] = lists(|settings| &settings["scenes"]);
+        if whole.settings["budget_search"].is_object() {
+            let others = lists(|settings| &settings["budget_search"]["not_searched"]);
+            whole.settings["budget_search"]["not_searched"] = others;
+        }
+        whole.records = parts.into_iter().flat_map(|part| part.records).collect();
         Ok(whole)
     }
 
@@ -221,14 +163,7 @@ impl StudyFile {
     pub fn budgets(&self) -> String {
         let search = &self.settings["budget_search"];
         let Some(rule) = search["rule"].as_str() else { return String::new() };
-        let names = |list: &Value| -> Vec<String> {
-            list.as_array()
-                .into_iter()
-                .flatten()
-                .filter_map(|name| Some(name.as_str()?.to_string()))
-                .collect()
-        };
-        let (scenes, others) = (names(&self.settings["scenes"]), names(&search["not_searched"]));
+        let (scenes, others) = (names_in(&self.settings["scenes"]), names_in(&search["not_searched"]));
         let mut text = String::new();
         if scenes.iter().any(|name| !others.contains(name)) {
             text += &format!("Budgets: searched among {rule}.\n");
@@ -261,14 +196,8 @@ impl StudyFile {
     /// Contents of the file, one record per line.
     pub fn to_json(&self) -> Result<Vec<u8>, Error> {
         let failed = |e: serde_json::Error| Error::invalid(NAME, e.to_string());
-        let head = serde_json::to_string_pretty(&StudyFile {
-            schema_version: SCHEMA,
-            environment: self.environment.clone(),
-            settings: self.settings.clone(),
-            missing_scenes: self.missing_scenes.clone(),
-            parts: self.parts.clone(),
-            records: Vec::new(),
-        });
+        let head = StudyFile { schema_version: SCHEMA, records: Vec::new(), ..self.clone() };
+        let head = serde_json::to_string_pretty(&head);
         let lines = self.records.iter().map(serde_json::to_string).collect::<Result<Vec<_>, _>>();
         let (head, lines) = (head.map_err(failed)?, lines.map_err(failed)?);
         // Records are the last member of the object, and the head contains none.
@@ -289,13 +218,13 @@ impl StudyFile {
             environment: Option<Value>,
         }
         if let Ok(Head { schema_version, environment }) = serde_json::from_slice(&text)
-            && schema_version != Some(SCHEMA)
+            && !schema_version.is_some_and(|version| (OLDEST_SCHEMA..=SCHEMA).contains(&version))
             && (schema_version.is_some() || environment.is_some())
         {
             let by = environment.as_ref().and_then(|e| e["version"].as_str()).unwrap_or("an unknown version");
             let version = schema_version.unwrap_or(1);
             let message = format!(
-                "a study of schema version {version} (written by simpulse {by}); this program reads version {SCHEMA}: run the study again"
+                "a study of schema version {version} (written by simpulse {by}); this program reads versions {OLDEST_SCHEMA} to {SCHEMA}: run the study again"
             );
             return Err(Error::Format { path, message });
         }
@@ -303,10 +232,9 @@ impl StudyFile {
     }
 }
 
-/// The first of every list, then the second of every list, and so on.
-fn in_turns<T: Clone>(lists: Vec<Vec<Vec<T>>>) -> Vec<T> {
-    let longest = lists.iter().map(Vec::len).max().unwrap_or(0);
-    (0..longest).flat_map(|i| lists.iter().filter_map(move |list| list.get(i))).flatten().cloned().collect()
+/// The names in a list.
+fn names_in(list: &Value) -> Vec<String> {
+    list.as_array().into_iter().flatten().filter_map(|name| Some(name.as_str()?.to_string())).collect()
 }
 
 #[cfg(test)]
@@ -349,8 +277,8 @@ mod tests {
             part
         });
         let whole = StudyFile::merged(parts.collect(), &names).unwrap();
-        assert_eq!(whole.scenes(), ["a", "b", "c", "d", "e"]);
-        assert_eq!(whole.settings["scenes"], serde_json::json!(["a", "b", "c", "d", "e"]));
+        assert_eq!(whole.scenes(), ["a", "c", "e", "b", "d"]);
+        assert_eq!(whole.settings["scenes"], serde_json::json!(["a", "c", "e", "b", "d"]));
         assert_eq!((whole.missing_scenes.len(), whole.parts.len()), (0, 2));
         assert_eq!(whole.settings["budget_search"]["not_searched"].as_array().map(Vec::len), Some(5));
         assert!(whole.budgets().starts_with("Not searched") && whole.budgets().contains("a, c, e, b, d"));
@@ -359,7 +287,7 @@ mod tests {
         let cut = StudyFile::merged(vec![of(&["a", "c"], &[]), of(&["b", "d"], &["d"])], &names).unwrap();
         assert_eq!(
             (cut.scenes(), cut.missing_scenes),
-            (vec!["a".into(), "b".into(), "c".into()], vec!["d".to_string()])
+            (vec!["a".into(), "c".into(), "b".into()], vec!["d".to_string()])
         );
 
         let twice = StudyFile::merged(vec![of(&["a"], &[]), of(&["a"], &[])], &names).unwrap_err();

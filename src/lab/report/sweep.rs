@@ -1,67 +1,53 @@
-//! A sweep as text: the values at which each solver is good enough, and a table of times and errors.
+//! A sweep as text: the values at which each solver is good enough.
 
-use super::by_scene::verdict;
-use super::doc::{DocCell, DocTable};
+use super::by_scene::{brief_table, in_order, scene_line};
+use super::doc::{self, DocTable};
 use super::environment::Environment;
-use super::units::{bodies, count, digits, ratio, si};
+use super::units::count;
 use crate::lab::study::Record;
-use crate::lab::study::curve::{ErrorAxis, solvers_of};
-use crate::lab::study::sample::Sample;
+use crate::lab::study::curve::solvers_of;
 use crate::lab::study::sweep::Swept;
-
-const LEGEND: &str = "\
-A setting is good enough if the scene holds (nothing falls, slides, tunnels or blows up) and its errors are within
-the tolerances of a plausible run (`simpulse list SCENE` lists them with their reasons): penetration, of 99 % of
-contact points and at rest; the contact-law residual, rms, in weights of the lighter body × step; the distance to
-the scene's reference value (– if none is known); the speed at rest.  Runs were not extended to a minute: later
-failures do not show.  budget: substeps; then velocity, relaxation and position sweeps per substep.
-µs/step: mean over the run, its median, its longest step, ± median deviation of a repeat; all settings of a scene
-were timed interleaved.  ns/contact: mean step ÷ mean number of contacts; B/contact: size of prepared records.
-";
 
 /// Whether these are records of a sweep.
 pub fn is_sweep(records: &[Record]) -> bool {
     records.iter().any(|r| r.swept.is_some())
 }
 
-/// All scenes, with a legend and a description of the machine.
+const LEGEND: &str = "\
+A setting is good enough if the scene holds and its errors are within the tolerances of a plausible run (`simpulse list \
+SCENE` lists them with their reasons). Runs were not extended to a minute: later failures do not show. budget: substeps; \
+then velocity, relaxation and position sweeps per substep. µs/step: mean over the run, its longest step, ± median \
+deviation of a repeat; all settings of a scene were timed interleaved. ns/contact: mean step ÷ mean number of contacts. \
+tables.txt has every column.";
+
+/// What was swept, on which machine, and per scene where it is good enough, with a table.
 pub fn text(records: &[Record], environment: &Environment) -> String {
-    let Some(swept) = records.iter().find_map(|r| r.swept) else { return String::new() };
-    let text = format!(
-        "Sweep of {}: {}, {}, {} settings\n{}; {}: {} lanes per instruction\n\n{LEGEND}",
-        swept.name,
-        count(records.chunk_by(|a, b| a.scene == b.scene).count(), "scene"),
+    let scenes: Vec<&[Record]> = records.chunk_by(|a, b| a.scene == b.scene).collect();
+    let head = format!(
+        "Sweep of {}: {}, {}, {} settings\n{}; {}: {} lanes per instruction\n",
+        records.iter().find_map(|r| r.swept).map_or("", |s| s.name),
+        count(scenes.len(), "scene"),
         count(solvers_of(records).len(), "solver"),
         records.len(),
         environment.cpu,
         environment.instructions(),
         environment.native_lanes,
     );
-    text + &scene_texts(records, swept)
-}
-
-/// The tables of all scenes, for a file.
-pub fn tables(records: &[Record]) -> String {
-    let swept = records.iter().find_map(|r| r.swept);
-    swept.map_or(String::new(), |swept| LEGEND.to_string() + &scene_texts(records, swept))
-}
-
-fn scene_texts(records: &[Record], swept: Swept) -> String {
-    let scenes = records.chunk_by(|a, b| a.scene == b.scene);
     let one = |scene: &[Record]| {
-        let name = format!("{} · {}", scene[0].scene, bodies(scene[0].bodies));
-        format!("\n{name}\n{}{}", reached(scene, swept), scene_table(scene, swept).text())
+        let table = DocTable { wide: true, ..brief_table(&in_order(scene)) };
+        format!("\n{} · {}\n{}\n{}", scene[0].scene, scene_line(scene), reached(scene), table.text())
     };
-    scenes.map(one).collect()
+    format!("{head}\n{}{}", doc::lines(LEGEND), scenes.into_iter().map(one).collect::<String>())
 }
 
 fn value(record: &Record) -> f64 {
     record.swept.map_or(0.0, |s| s.value)
 }
 
-/// The values at which each solver is good enough on a scene, a line each.
-pub fn reached(scene: &[Record], swept: Swept) -> String {
+/// The values at which each solver is good enough on a scene, a line each; empty unless it is a sweep.
+pub fn reached(scene: &[Record]) -> String {
     let mut text = String::new();
+    let Some(swept) = scene.iter().find_map(|r| r.swept) else { return text };
     let width = solvers_of(scene).iter().map(|s| s.len()).max().unwrap_or(0);
     for solver in solvers_of(scene) {
         text += &format!("  {solver:<width$}  {}\n", reach(scene, solver, swept));
@@ -75,35 +61,6 @@ pub fn reached(scene: &[Record], swept: Swept) -> String {
         }
     }
     text
-}
-
-/// The settings of a scene by value.
-pub fn scene_table(scene: &[Record], swept: Swept) -> DocTable {
-    let unit = if swept.unit.is_empty() { String::new() } else { format!(" ({})", swept.unit) };
-    let heading = format!("{}{unit}", swept.name);
-    let head = [
-        "solver",
-        &heading,
-        "budget",
-        "lanes",
-        "µs/step",
-        "median",
-        "longest",
-        "±",
-        "ns/contact",
-        "B/contact",
-        "penetration",
-        "residual",
-        "reference",
-        "verdict",
-    ];
-    let mut rows = DocTable { wide: true, ..DocTable::new("", 1, &head) };
-    for solver in solvers_of(scene) {
-        let mut own: Vec<&Record> = scene.iter().filter(|r| r.solver == solver).collect();
-        own.sort_by(|a, b| value(a).total_cmp(&value(b)));
-        own.into_iter().for_each(|record| rows.row(row(record)));
-    }
-    rows
 }
 
 /// The values at which a solver is good enough, and those at which it holds.
@@ -144,35 +101,10 @@ fn alike(scene: &[Record], solver: &str) -> Vec<Vec<f64>> {
     groups.filter(|values| values.len() > 1).collect()
 }
 
-fn row(record: &Record) -> Vec<DocCell> {
-    let nothing = || "–".to_string();
-    let time = |of: fn(&Sample) -> f64| record.sample.as_ref().map_or_else(nothing, |s| digits(of(s) / 1e3));
-    let loaded = record.sample.as_ref().filter(|s| s.load.contacts > 0.0);
-    let reference = record.truth.map(|t| t.error.map_or("missed".to_string(), |e| si(e, t.unit)));
-    let depth = ErrorAxis::Penetration.of(record).map_or_else(nothing, |depth| si(depth, "m"));
-    let residual = ErrorAxis::Law.of(record).map_or_else(nothing, ratio);
-    let order = if record.order.is_serial() { record.order.name().into() } else { record.lanes.to_string() };
-    let texts = [
-        value(record).to_string(),
-        record.budget_text.clone(),
-        order,
-        time(|s| s.mean_ns),
-        time(|s| s.median_ns),
-        time(|s| s.worst_ns),
-        time(|s| s.spread_ns),
-        loaded.map_or_else(nothing, |s| digits(s.mean_ns / s.load.contacts)),
-        loaded.map_or_else(nothing, |s| digits(s.load.bytes_per_contact)),
-        depth,
-        residual,
-        reference.unwrap_or_else(nothing),
-        verdict(record),
-    ];
-    std::iter::once(DocCell::solver(record.solver)).chain(texts.map(DocCell::from)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lab::report::tables;
     use crate::lab::study::record::tests::{failed, fell, record};
 
     #[test]
@@ -201,6 +133,6 @@ mod tests {
         let lines: Vec<&str> = text.lines().filter(|l| l.starts_with("pgs")).collect();
         assert_eq!(lines.len(), 4);
         let cells = |line: &&str| line.split("  ").filter(|cell| !cell.trim().is_empty()).count();
-        assert!(lines.iter().all(|line| cells(line) == 14), "{text}");
+        assert!(lines.iter().all(|line| cells(line) == 23), "{text}");
     }
 }

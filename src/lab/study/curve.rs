@@ -49,6 +49,16 @@ impl ErrorAxis {
         }
     }
 
+    /// Name for tables.
+    pub fn word(self) -> &'static str {
+        match self {
+            ErrorAxis::Penetration => "penetration",
+            ErrorAxis::Law => "residual",
+            ErrorAxis::Truth => "reference",
+            ErrorAxis::Rest => "rest speed",
+        }
+    }
+
     /// The error of a record. `None` if the run failed, if the scene has no reference value, or if the run
     /// never reached the observed event.
     pub fn of(self, record: &Record) -> Option<f64> {

@@ -23,37 +23,53 @@ pub struct TunedBudget {
     pub parameters: Parameters,
 }
 
-/// Settings found for one solver on one scene.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FoundBudgets {
+/// A setting found for a solver on a scene: a line of the file. Those of a solver on a scene are sorted by work, the
+/// least first.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FoundSetting {
     /// Scene name with its size.
     pub scene: String,
     /// Name of the solver.
-    pub solver: &'static str,
+    pub solver: String,
     /// How impacts are solved.
     pub impacts: Impacts,
-    /// The settings, sorted by work, the least first.
-    pub candidates: Vec<TunedBudget>,
+    substeps: u32,
+    velocity_iterations: u32,
+    relax_iterations: u32,
+    position_iterations: u32,
+    /// The parameters that differ from the solver's defaults.
+    parameters: String,
+}
+
+impl FoundSetting {
+    /// From a setting.
+    pub fn new(scene: &str, solver: &Variant, impacts: Impacts, tuned: &TunedBudget) -> Self {
+        let Budget { substeps, velocity_iterations, relax_iterations, position_iterations } = tuned.budget;
+        FoundSetting {
+            scene: scene.into(),
+            solver: solver.name.into(),
+            impacts,
+            substeps,
+            velocity_iterations,
+            relax_iterations,
+            position_iterations,
+            parameters: overrides::changed(solver, &tuned.parameters),
+        }
+    }
+
+    /// The setting itself. Errors: unknown solvers or parameters.
+    fn tuned(&self) -> Result<TunedBudget, Error> {
+        let FoundSetting { substeps, velocity_iterations, relax_iterations, position_iterations, .. } = *self;
+        let budget = Budget { substeps, velocity_iterations, relax_iterations, position_iterations };
+        Ok(TunedBudget { budget, parameters: overrides::of_words(find(&self.solver)?, &self.parameters)? })
+    }
 }
 
 /// A list of found settings.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Found {
-    /// The entries, grouped by scene.
-    pub entries: Vec<FoundBudgets>,
-}
-
-/// A line of the file.
-#[derive(Serialize, Deserialize)]
-struct BudgetLine {
-    scene: String,
-    solver: String,
-    impacts: Impacts,
-    substeps: u32,
-    velocity_iterations: u32,
-    relax_iterations: u32,
-    position_iterations: u32,
-    parameters: String,
+    /// The lines, grouped by scene.
+    pub entries: Vec<FoundSetting>,
 }
 
 impl Found {
@@ -68,63 +84,27 @@ impl Found {
     /// `None` if the list has neither.
     pub fn of(&self, scene: &str, solver: &Variant, impacts: Impacts) -> Option<Vec<TunedBudget>> {
         let with = |impacts: Impacts| {
-            let is =
-                |e: &&FoundBudgets| (e.scene.as_str(), e.solver, e.impacts) == (scene, solver.name, impacts);
-            self.entries.iter().find(is).map(|e| e.candidates.clone())
+            let is = |e: &&FoundSetting| e.scene == scene && e.solver == solver.name && e.impacts == impacts;
+            let settings: Vec<_> = self.entries.iter().filter(is).filter_map(|e| e.tuned().ok()).collect();
+            Some(settings).filter(|settings| !settings.is_empty())
         };
         with(impacts).or_else(|| with(Impacts::Own))
     }
 
     /// Parses a list in CSV format. Errors: malformed text, and unknown solvers or parameters.
     pub fn of_csv(text: &str) -> Result<Found, Error> {
-        let mut entries: Vec<FoundBudgets> = Vec::new();
-        for line in csv::Reader::from_reader(text.as_bytes()).deserialize() {
-            let line: BudgetLine = line.map_err(|e| Error::invalid(NAME, e.to_string()))?;
-            let solver = find(&line.solver)?;
-            let candidate = TunedBudget {
-                budget: Budget {
-                    substeps: line.substeps,
-                    velocity_iterations: line.velocity_iterations,
-                    relax_iterations: line.relax_iterations,
-                    position_iterations: line.position_iterations,
-                },
-                parameters: overrides::of_words(solver, &line.parameters)?,
-            };
-            match entries.last_mut() {
-                Some(last)
-                    if (&last.scene, last.solver, last.impacts)
-                        == (&line.scene, solver.name, line.impacts) =>
-                {
-                    last.candidates.push(candidate);
-                }
-                _ => entries.push(FoundBudgets {
-                    scene: line.scene,
-                    solver: solver.name,
-                    impacts: line.impacts,
-                    candidates: vec![candidate],
-                }),
-            }
-        }
+        let lines = csv::Reader::from_reader(text.as_bytes()).into_deserialize();
+        let entries = lines.collect::<Result<Vec<FoundSetting>, _>>();
+        let entries = entries.map_err(|e| Error::invalid(NAME, e.to_string()))?;
+        entries.iter().try_for_each(|entry| entry.tuned().map(|_| ()))?;
         Ok(Found { entries })
     }
 
-    /// The list in CSV format, one line per setting.
+    /// The list in CSV format.
     pub fn to_csv(&self) -> Result<Vec<u8>, Error> {
         let mut writer = csv::Writer::from_writer(Vec::new());
-        for FoundBudgets { scene, solver, impacts, candidates } in &self.entries {
-            for TunedBudget { budget, parameters } in candidates {
-                let line = BudgetLine {
-                    scene: scene.clone(),
-                    solver: (*solver).into(),
-                    impacts: *impacts,
-                    substeps: budget.substeps,
-                    velocity_iterations: budget.velocity_iterations,
-                    relax_iterations: budget.relax_iterations,
-                    position_iterations: budget.position_iterations,
-                    parameters: overrides::changed(find(solver)?, parameters),
-                };
-                writer.serialize(line).map_err(|e| Error::invalid(NAME, e.to_string()))?;
-            }
+        for line in &self.entries {
+            writer.serialize(line).map_err(|e| Error::invalid(NAME, e.to_string()))?;
         }
         writer.into_inner().map_err(|e| Error::invalid(NAME, e.to_string()))
     }

@@ -203,11 +203,12 @@ impl Timing {
         // The part of the wait that was not subtracted from a step occurred elsewhere in the block.
         if waits - taken > WAITED * ran {
             let mut kept: Vec<f64> = times.into_iter().filter(|t| t.is_finite()).collect();
+            // The wait may have occurred in an untimed step: no time falls below the shortest.
+            let shortest = kept.iter().copied().fold(f64::INFINITY, f64::min);
             if let Some(longest) = kept.iter_mut().max_by(|a, b| a.total_cmp(b)) {
-                *longest = (*longest - (waits - taken)).max(0.0);
+                *longest = (*longest - (waits - taken)).max(shortest);
             }
-            // If the wait occurred in an untimed step, the longest step may drop to zero.
-            self.spare.extend(kept.into_iter().filter(|t| *t > 0.0));
+            self.spare.extend(kept);
             return;
         }
         let timed: Vec<f64> = times.iter().copied().filter(|t| t.is_finite()).collect();

@@ -21,8 +21,6 @@ pub mod horizon;
 #[doc(hidden)]
 pub mod interleave;
 pub mod pace;
-#[doc(hidden)]
-pub mod pareto;
 pub mod plan;
 #[doc(hidden)]
 pub mod profile;
@@ -39,22 +37,20 @@ pub mod telling;
 use crate::engine::constraints::{Features, Impacts};
 use crate::engine::lanes::LaneWidth;
 use crate::engine::narrowphase::frozen::Freezing;
+use crate::engine::params::Budget;
 use crate::engine::solvers::{VARIANTS, Variant, find};
-use crate::engine::world::{Divergence, Order, Settings};
+use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
-use crate::lab::metrics::Errors;
 use crate::lab::overrides;
 use crate::lab::parallel::{in_parallel, processors};
 use crate::lab::scenes::class::SceneClass;
-use crate::lab::scenes::holds::Broken;
 use crate::lab::scenes::{Loaded, Scene};
 use crate::lab::trial::{Trial, TrialOutcome};
 use compare::Ratio;
-use found::{Found, FoundBudgets, TunedBudget};
+use found::{Found, FoundSetting, TunedBudget};
 use interleave::Interleaved;
 pub use plan::{StudyPlan, is_path, open_scene};
-pub use record::{FailedAt, Fronts, Record, TruthError, mark_fronts};
-use sample::Sample;
+pub use record::{FailedAt, Record, TruthError};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use sweep::Swept;
@@ -136,21 +132,26 @@ impl ErrorCell {
     }
 }
 
-/// Results of an error run.
-#[derive(Clone)]
-pub struct RunOutcome {
-    /// Errors of the whole run, or the divergence that ended it.
-    pub errors: Result<Errors, Divergence>,
-    /// Distance to the scene's reference value.
-    pub truth: Option<TruthError>,
-    /// The first violated requirement of the scene.
-    pub broken: Option<Broken>,
+/// An error run.
+struct JudgedRun {
+    /// Its record, without times.
+    record: Record,
     /// Hash of the state after the steps of a timing run.
-    pub hash: u64,
+    hash: u64,
+    /// Sweeps plus substeps of an average step.
+    work: f64,
+}
+
+/// A record that waits for its times.
+struct TimedRun<'a> {
+    cell: &'a ErrorCell,
+    width: LaneWidth,
+    record: Record,
+    hash: u64,
 }
 
 /// Receives the records of a scene, and the settings that a search found for it.
-pub type SceneFinished<'a> = dyn FnMut(&[Record], &[FoundBudgets]) -> Result<(), Error> + 'a;
+pub type SceneFinished<'a> = dyn FnMut(&[Record], &[FoundSetting]) -> Result<(), Error> + 'a;
 
 /// Runs the plan, scene by scene. Returns one record per scene, solver, budget, order and width, in that
 /// order. `finished` receives the records of a scene, and the settings that a search found for it, as soon as
@@ -209,20 +210,33 @@ fn scene_records(
     let jobs: Vec<(&ErrorCell, Order)> =
         cells.iter().flat_map(|cell| plan.orders.iter().map(move |&order| (cell, order))).collect();
     let (done, total) = (AtomicUsize::new(0), (jobs.len() + 1).max(2) as f64);
-    let outcomes = in_parallel(&jobs, processors(), |&(cell, order)| {
+    let judged = in_parallel(&jobs, processors(), |&(cell, order)| {
         let share = done.fetch_add(1, Ordering::Relaxed) as f64 / total;
         tell(0.5 * share, format!("errors {name} · {} · {}", cell.solver.name, cell.text()));
         let width = match order {
             Order::Colored => plan.widths.iter().copied().max().unwrap_or(LaneWidth::W1),
             _ => LaneWidth::W1,
         };
-        observe(plan.open_at(name, cell.swept)?, settings(plan, cell, order, width), steps)
+        judge(plan, name, cell, (order, width), Some(steps))
     })?;
-    let with_outcome = jobs.iter().zip(&outcomes);
-    let rows: Vec<RecordRow> =
-        with_outcome.flat_map(|(&(cell, order), outcome)| rows(plan, cell, order, outcome)).collect();
-    let mut records =
-        timed_records(plan, &variants, steps, &rows, &|share, what| tell(0.5 + 0.4 * share, what))?;
+    let mut runs: Vec<TimedRun> = Vec::new();
+    for (&(cell, order), JudgedRun { record, hash, .. }) in jobs.iter().zip(judged) {
+        let widths = match order {
+            Order::Colored if cell.widest_alone => &plan.widths[plan.widths.len() - 1..],
+            _ if cell.widest_alone => &[],
+            Order::Colored => &plan.widths,
+            _ => &[LaneWidth::W1],
+        };
+        let own = |&width: &LaneWidth| TimedRun {
+            cell,
+            width,
+            record: Record { lanes: width.lanes(), ..record.clone() },
+            hash,
+        };
+        runs.extend(widths.iter().map(own));
+    }
+    time(plan, &variants, steps, &mut runs, &|share, what| tell(0.5 + 0.4 * share, what))?;
+    let mut records: Vec<Record> = runs.into_iter().map(|run| run.record).collect();
     // What was asked for is judged in any case.
     if plan.steps.is_some() && !plan.only_given {
         leave_out_unseen(&mut records, variants[0].scene.steps);
@@ -233,7 +247,6 @@ fn scene_records(
         let Loaded { scene, demands, .. } = &variants[0];
         horizon::run_on(scene, demands, &mut records, &|what| tell(0.95, what))?;
     }
-    mark_fronts(&mut records);
     Ok(records)
 }
 
@@ -270,147 +283,103 @@ fn timing_steps<'a>(plan: &StudyPlan, scenes: impl IntoIterator<Item = &'a Scene
     scenes.into_iter().map(|scene| scene.steps).fold(plan.timing_steps, u32::min)
 }
 
-/// Runs a scene to its end and measures its errors. The hash is taken after step `hash_at`.
-pub fn observe(mut loaded: Loaded, settings: Settings, hash_at: u32) -> Result<RunOutcome, Error> {
-    let settings = Settings { record_impulses: true, observe_rule: true, ..settings };
-    let mut hash = 0;
-    let found = Trial::of(&mut loaded, settings).run(&mut |world| {
-        if world.step_index == u64::from(hash_at) {
+/// Runs a scene and measures its errors: to its end, with the hash after step `hash_at`, or without one only up to the
+/// first violated requirement.
+fn judge(
+    plan: &StudyPlan,
+    name: &str,
+    cell: &ErrorCell,
+    (order, width): (Order, LaneWidth),
+    hash_at: Option<u32>,
+) -> Result<JudgedRun, Error> {
+    let mut loaded = plan.open_at(name, cell.swept)?;
+    let own = settings(plan, cell, order, width);
+    let parameters = overrides::words(cell.solver, &own.parameters);
+    let own = Settings { record_impulses: true, observe_rule: true, ..own };
+    let (mut hash, mut steps, mut sweeps) = (0, 0_u64, 0);
+    let trial = Trial { until_broken: hash_at.is_none(), ..Trial::of(&mut loaded, own) };
+    let found = trial.run(&mut |world| {
+        if hash_at.is_some_and(|step| world.step_index == u64::from(step)) {
             hash = world.state_hash();
         }
-        Ok(())
-    })?;
-    Ok(RunOutcome::new(found, hash))
-}
-
-/// The same up to the first violated requirement. Also returns the work of an average step: its sweeps and
-/// substeps.
-fn observe_until_broken(loaded: &mut Loaded, settings: Settings) -> Result<(RunOutcome, f64), Error> {
-    let settings = Settings { record_impulses: true, observe_rule: true, ..settings };
-    let substeps = f64::from(settings.budget.substeps);
-    let (mut steps, mut sweeps) = (0_u64, 0);
-    let trial = Trial { until_broken: true, ..Trial::of(loaded, settings) };
-    let found = trial.run(&mut |world| {
         if world.step_index > 0 {
             (steps, sweeps) = (steps + 1, sweeps + world.counts.sweeps);
         }
         Ok(())
     })?;
-    let steps = steps as f64;
-    let work = (sweeps as f64 + steps * substeps) / steps.max(1.0);
-    Ok((RunOutcome::new(found, 0), work))
-}
-
-impl RunOutcome {
-    fn new(found: TrialOutcome, hash: u64) -> Self {
-        let TrialOutcome { errors, failure, truth, broken, .. } = found;
-        let errors = failure.map_or(Ok(errors.unwrap_or_default()), Err);
-        RunOutcome { broken: broken.filter(|_| errors.is_ok()), errors, truth, hash }
-    }
-}
-
-/// Source of a record.
-struct RecordRow<'a> {
-    cell: &'a ErrorCell,
-    order: Order,
-    width: LaneWidth,
-    outcome: &'a RunOutcome,
-}
-
-/// All widths of a cell in an order.
-fn rows<'a>(
-    plan: &StudyPlan,
-    cell: &'a ErrorCell,
-    order: Order,
-    outcome: &'a RunOutcome,
-) -> impl Iterator<Item = RecordRow<'a>> {
-    let widths = match order {
-        Order::Colored if cell.widest_alone => plan.widths[plan.widths.len() - 1..].to_vec(),
-        _ if cell.widest_alone => Vec::new(),
-        Order::Colored => plan.widths.clone(),
-        _ => vec![LaneWidth::W1],
+    let TrialOutcome { errors, failure, truth, broken, .. } = found;
+    let Loaded { scene, tolerances, unchecked, .. } = loaded;
+    let Budget { substeps, .. } = cell.tuned.budget;
+    let record = Record {
+        bodies: scene.bodies.len(),
+        scene: scene.name,
+        class: SceneClass::default(),
+        dt: scene.dt,
+        solver: cell.solver.name,
+        order,
+        lanes: width.lanes(),
+        budget: cell.tuned.budget,
+        budget_text: cell.text(),
+        impacts: cell.impacts,
+        frozen: cell.frozen,
+        parameters,
+        swept: cell.swept,
+        sample: None,
+        speed_up: None,
+        errors: failure.is_none().then(|| errors.unwrap_or_default()),
+        truth,
+        tolerances,
+        broken: broken.filter(|_| failure.is_none()),
+        unchecked,
+        later: None,
+        bits_equal: None,
+        failure: failure.map(FailedAt::from),
     };
-    widths.into_iter().map(move |width| RecordRow { cell, order, width, outcome })
+    let work = (sweeps as f64 + steps as f64 * f64::from(substeps)) / (steps as f64).max(1.0);
+    Ok(JudgedRun { record, hash, work })
 }
 
 /// Times all settings of a scene that did not diverge, in common rounds. `variants`: the scene at each value
 /// of the sweep.
-fn timed_records(
+fn time(
     plan: &StudyPlan,
     variants: &[Loaded],
     steps: u32,
-    rows: &[RecordRow],
+    runs: &mut [TimedRun],
     tell: &dyn Fn(f64, String),
-) -> Result<Vec<Record>, Error> {
-    let variant = |row: &RecordRow| &variants[row.cell.point];
-    let running = rows.iter().filter(|row| row.outcome.errors.is_ok());
-    let chosen = running.map(|row| (&variant(row).scene, settings(plan, row.cell, row.order, row.width)));
+) -> Result<(), Error> {
+    let running = runs.iter().filter(|run| run.record.failure.is_none());
+    let chosen = running.map(|run| {
+        let scene = &variants[run.cell.point].scene;
+        (scene, settings(plan, run.cell, run.record.order, run.width))
+    });
     let mut interleaved = Interleaved::new(chosen.collect(), steps, plan.seed);
     let name = &variants[0].scene.name;
     for pass in 1..=plan.repeats {
         tell(f64::from(pass - 1) / f64::from(plan.repeats), format!("times {name} · pass {pass}"));
         interleaved.run(1)?;
     }
-    // Samples are in the order of the rows that run.
-    let mut next = 0..;
-    let record = |row: &RecordRow| {
-        let sample = row.outcome.errors.and_then(|_| interleaved.sample(next.next().unwrap_or(0)));
-        let failure = sample.as_ref().err().map(|&d| FailedAt::from(d));
-        record_of(plan, variant(row), row, sample.ok(), failure)
-    };
-    let mut records: Vec<Record> = rows.iter().map(record).collect();
-
-    let one_lane = |r: &Record| r.order == Order::Colored && r.lanes == 1;
-    for i in 0..records.len() {
-        let own = &records[i];
-        let budget = |r: &&Record| {
-            let key = |r: &Record| (r.solver, r.budget, r.impacts, r.frozen, r.swept, r.parameters.clone());
-            key(r) == key(own)
-        };
-        let slow = records.iter().filter(budget).find(|r| one_lane(r)).and_then(|r| r.sample.as_ref());
+    for (i, run) in runs.iter_mut().filter(|run| run.record.failure.is_none()).enumerate() {
+        match interleaved.sample(i) {
+            Ok(sample) => {
+                run.record.bits_equal = Some(sample.hash == run.hash);
+                run.record.sample = Some(sample);
+            }
+            Err(divergence) => {
+                run.record.errors = None;
+                run.record.failure = Some(divergence.into());
+            }
+        }
+    }
+    for i in 0..runs.len() {
+        let own = &runs[i].record;
+        let key = |r: &Record| (r.solver, r.budget, r.impacts, r.frozen, r.swept, r.parameters.clone());
+        let one_lane = |r: &&Record| r.order == Order::Colored && r.lanes == 1 && key(r) == key(own);
+        let slow = runs.iter().map(|run| &run.record).find(one_lane).and_then(|r| r.sample.as_ref());
         let ratio = slow.zip(own.sample.as_ref()).and_then(|(slow, own)| Ratio::of(slow, own));
-        records[i].speed_up = ratio.map(|r| r.median);
+        runs[i].record.speed_up = ratio.map(|r| r.median);
     }
-    Ok(records)
-}
-
-/// The record of a setting, with its times if there are any, and its failure if it failed.
-fn record_of(
-    plan: &StudyPlan,
-    loaded: &Loaded,
-    row: &RecordRow,
-    sample: Option<Sample>,
-    failure: Option<FailedAt>,
-) -> Record {
-    let RecordRow { cell, order, width, outcome } = row;
-    let Loaded { scene, tolerances, unchecked, .. } = loaded;
-    let parameters = settings(plan, cell, *order, *width).parameters;
-    Record {
-        scene: scene.name.clone(),
-        bodies: scene.bodies.len(),
-        class: SceneClass::default(),
-        dt: scene.dt,
-        solver: cell.solver.name,
-        order: *order,
-        lanes: width.lanes(),
-        budget: cell.tuned.budget,
-        budget_text: cell.text(),
-        impacts: cell.impacts,
-        frozen: cell.frozen,
-        parameters: overrides::words(cell.solver, &parameters),
-        swept: cell.swept,
-        speed_up: None,
-        errors: outcome.errors.ok().filter(|_| failure.is_none()),
-        truth: outcome.truth,
-        tolerances: *tolerances,
-        broken: outcome.broken,
-        unchecked: unchecked.clone(),
-        later: None,
-        bits_equal: sample.as_ref().map(|sample| sample.hash == outcome.hash),
-        front: Fronts::default(),
-        sample,
-        failure,
-    }
+    Ok(())
 }
 
 #[cfg(test)]

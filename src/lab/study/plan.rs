@@ -11,7 +11,6 @@ use crate::engine::params::Budget;
 use crate::engine::solvers::{DEFAULT, Variant, find};
 use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
-use crate::lab::files;
 use crate::lab::memory;
 use crate::lab::overrides::{self, Override};
 use crate::lab::parallel::processors;
@@ -245,12 +244,9 @@ impl StudyPlan {
                     )
                 }
                 (broken, speed) => {
-                    let why = match (broken, speed) {
-                        (Some(broken), _) => broken.to_string(),
-                        (None, speed) => {
-                            format!("moves at {} after a minute", si(speed.unwrap_or(f64::NAN), "m/s"))
-                        }
-                    };
+                    let moves =
+                        || format!("moves at {} after a minute", si(speed.unwrap_or(f64::NAN), "m/s"));
+                    let why = broken.map_or_else(moves, |broken| broken.to_string());
                     format!(
                         "under {DEFAULT} it does not come to rest ({why}), so no rest is required: only that \
                          nothing blows up or passes through static or kinematic bodies, for its own {} steps",
@@ -364,7 +360,7 @@ pub fn open_scene(
     dt: Option<f64>,
 ) -> Result<Loaded, Error> {
     if is_path(name) {
-        let mut scene = Scene::from_file(files::path_of(name))?;
+        let mut scene = Scene::from_file(name)?;
         scene.steps = steps.unwrap_or(scene.steps);
         scene.dt = dt.unwrap_or(scene.dt);
         scene.validate()?;

@@ -1,8 +1,7 @@
-//! Results of a study: one record per setting, and the records on the Pareto fronts.
+//! Results of a study: one record per setting.
 
 use super::budget;
 use super::curve::ErrorAxis;
-use super::pareto::{self, TimeAndError};
 use super::sample::Sample;
 use super::sweep::Swept;
 use crate::engine::constraints::Impacts;
@@ -79,8 +78,6 @@ pub struct Record {
     pub later: Option<Later>,
     /// Whether this width ended with the same bits as the error run.
     pub bits_equal: Option<bool>,
-    /// Fronts that include the setting, at its fastest width only.
-    pub front: Fronts,
     /// Divergence that ended the run.
     pub failure: Option<FailedAt>,
 }
@@ -190,12 +187,7 @@ impl Record {
 
     /// The command that runs this setting on `scene`, a name or a file.
     pub fn command(&self, scene: &str) -> String {
-        let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-.:/".contains(c);
-        let scene = match scene.chars().all(is_plain) && !scene.is_empty() {
-            true => scene.to_string(),
-            false => format!("'{}'", scene.replace('\'', "'\\''")),
-        };
-        let mut text = format!("simpulse run {scene} --solver {}", self.solver);
+        let mut text = format!("simpulse run {} --solver {}", quoted(scene), self.solver);
         text += &match self.order {
             Order::Colored => format!(" --lanes {}", self.lanes),
             order => format!(" --order {}", order.name()),
@@ -226,7 +218,7 @@ impl Record {
         format!("{} --picture failed.svg{step}", self.command(scene))
     }
 
-    /// Whether the run holds. Fronts, profiles and advice include only such settings.
+    /// Whether the run holds. Profiles and advice include only such settings.
     pub fn holds(&self) -> bool {
         self.mark().is_none()
     }
@@ -269,17 +261,14 @@ impl Record {
     }
 }
 
-/// Membership in the Pareto fronts of time and each of three errors.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub struct Fronts {
-    /// Front of time and deepest penetration.
-    pub penetration: bool,
-    /// Front of time and contact-law residual (root mean square).
-    #[serde(rename = "residual")]
-    pub law: bool,
-    /// Front of time and distance to the reference value.
-    #[serde(rename = "reference")]
-    pub truth: bool,
+/// A word of a command, in quotes if a shell would change it.
+#[doc(hidden)]
+pub fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-.:/=,".contains(c);
+    match word.chars().all(is_plain) && !word.is_empty() {
+        true => word.to_string(),
+        false => format!("'{}'", word.replace('\'', "'\\''")),
+    }
 }
 
 /// Body and step at which a run diverged.
@@ -311,40 +300,6 @@ impl std::fmt::Display for FailedAt {
         let &FailedAt { step, body, quantity, criterion, speed } = self;
         Divergence { step, body, quantity, criterion, speed: speed.unwrap_or(f32::NAN) }.fmt(f)
     }
-}
-
-/// Marks the settings on each front, for each scene and each value of a sweep, among those that hold. A
-/// setting is a solver, a budget and an order, at its fastest width.
-pub fn mark_fronts(records: &mut [Record]) {
-    for group in records.chunk_by_mut(|a, b| a.scene == b.scene && a.swept == b.swept) {
-        let fastest: Vec<usize> =
-            (0..group.len()).filter(|&i| group[i].holds() && is_fastest(group, i)).collect();
-        let mut mark = |error: fn(&Record) -> Option<f64>, flag: fn(&mut Fronts) -> &mut bool| {
-            let (indices, points): (Vec<usize>, Vec<TimeAndError>) = fastest
-                .iter()
-                .filter_map(|&i| {
-                    let (sample, error) = (group[i].sample.as_ref()?, error(&group[i])?);
-                    Some((i, TimeAndError { sample, error }))
-                })
-                .unzip();
-            let fronts = pareto::front(&points);
-            for (i, on_front) in indices.into_iter().zip(fronts) {
-                *flag(&mut group[i].front) = on_front;
-            }
-        };
-        mark(|r| ErrorAxis::Penetration.of(r), |f| &mut f.penetration);
-        mark(|r| ErrorAxis::Law.of(r), |f| &mut f.law);
-        mark(|r| ErrorAxis::Truth.of(r), |f| &mut f.truth);
-    }
-}
-
-/// Whether no width of the same setting is faster than record `i`.
-fn is_fastest(group: &[Record], i: usize) -> bool {
-    let own = &group[i];
-    let time = |r: &Record| r.sample.as_ref().map(Sample::cost_ns);
-    let Some(own_time) = time(own) else { return false };
-    let same = |r: &Record| r.setting() == own.setting();
-    !group.iter().any(|r| same(r) && time(r).is_some_and(|t| t < own_time))
 }
 
 #[cfg(test)]
@@ -398,7 +353,6 @@ pub(crate) mod tests {
             unchecked: Vec::new(),
             later: None,
             bits_equal: Some(true),
-            front: Fronts::default(),
             failure: None,
         }
     }
@@ -459,27 +413,6 @@ pub(crate) mod tests {
         let broken = Some(Broken { mark: Mark::Fell, step: 800, body: None });
         record.later = Some(Later { broken, rest_speed_m_s: Some(0.0), ..later });
         assert_eq!((good(&record), record.fails_later()), ([false; 3], Some("fell at step 800".into())));
-    }
-
-    #[test]
-    fn only_the_fastest_width_of_a_setting_is_on_a_front() {
-        let mut records = vec![
-            record(1, 1, 20.0, 0.5),
-            record(8, 1, 10.0, 0.5),
-            record(1, 2, 30.0, 0.1),
-            record(8, 2, 15.0, 0.1),
-            record(8, 4, 40.0, 0.2),
-            failed(8),
-            // The fastest and most accurate of all, but it fell.
-            fell(8, 8, 1.0, 0.0),
-        ];
-        mark_fronts(&mut records);
-        let marked: Vec<bool> = records.iter().map(|r| r.front.penetration).collect();
-        assert_eq!(marked, [false, true, false, true, false, false, false]);
-        // All residuals are zero, so only time counts. The scene has no reference value.
-        let marked: Vec<bool> = records.iter().map(|r| r.front.law).collect();
-        assert_eq!(marked, [false, true, false, false, false, false, false]);
-        assert!(records.iter().all(|r| !r.front.truth));
     }
 
     #[test]

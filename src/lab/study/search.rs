@@ -21,10 +21,9 @@
 //! whole runs as well, until one is. So no solver fails on a scene because of candidates that only had short
 //! runs.
 
-use super::found::{FoundBudgets, TunedBudget};
+use super::found::{FoundSetting, TunedBudget};
 use super::horizon::later;
-use super::{ErrorCell, FailedAt, Record, RecordRow, StudyPlan};
-use super::{leave_out_unseen, observe_until_broken, record_of, settings};
+use super::{ErrorCell, JudgedRun, Record, StudyPlan, judge, leave_out_unseen, settings};
 use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::narrowphase::frozen::Freezing;
@@ -86,7 +85,7 @@ pub fn search(
     plan: &StudyPlan,
     name: &str,
     tell: &(dyn Fn(f64, String) + Sync),
-) -> Result<Vec<FoundBudgets>, Error> {
+) -> Result<Vec<FoundSetting>, Error> {
     let loaded = plan.open(name)?;
     let rests = loaded.rests();
     let Loaded { scene, demands, .. } = loaded;
@@ -107,14 +106,13 @@ pub fn search(
     in_parallel(&jobs, processors(), |job| {
         let share = done.fetch_add(1, Ordering::Relaxed) as f64 / total;
         tell(share, format!("searching {name} · {}", job.solver.name));
-        let candidates = job.best()?;
-        Ok(FoundBudgets {
-            scene: scene.name.clone(),
-            solver: job.solver.name,
-            impacts: job.impacts,
-            candidates,
-        })
+        let best = job.best()?;
+        Ok(best
+            .iter()
+            .map(|b| FoundSetting::new(&scene.name, job.solver, job.impacts, b))
+            .collect::<Vec<_>>())
     })
+    .map(|found| found.concat())
 }
 
 /// The candidates of a solver in steps of `dt` (s): those with standard parameters first, then the others as
@@ -271,17 +269,10 @@ impl SearchJob<'_> {
     /// Runs candidates for `steps` steps, or for those of the scene.
     fn judged(&self, list: &[TunedBudget], steps: Option<u32>) -> Result<Vec<SearchTrial>, Error> {
         let plan = StudyPlan { steps, ..self.plan.clone() };
-        let (order, width) = self.order();
-        let (mut records, mut works) = (Vec::new(), Vec::new());
-        for candidate in list {
-            let (cell, mut loaded) = (self.cell(candidate), plan.open(self.name)?);
-            let given = settings(&plan, &cell, order, width);
-            let (outcome, work) = observe_until_broken(&mut loaded, given)?;
-            let row = RecordRow { cell: &cell, order, width, outcome: &outcome };
-            let failure = outcome.errors.as_ref().err().map(|&d| FailedAt::from(d));
-            records.push(record_of(&plan, &loaded, &row, None, failure));
-            works.push(work);
-        }
+        let run = |candidate| judge(&plan, self.name, &self.cell(candidate), self.order(), None);
+        let runs = list.iter().map(run).collect::<Result<Vec<JudgedRun>, Error>>()?;
+        let (mut records, works): (Vec<Record>, Vec<f64>) =
+            runs.into_iter().map(|run| (run.record, run.work)).unzip();
         let is_last = plan.only_given && steps == self.plan.steps;
         if let Some(steps) = steps.filter(|_| !is_last) {
             leave_out_unseen(&mut records, steps);

@@ -24,11 +24,11 @@ const MOST: usize = 100;
 
 /// Quantities that a sweep can vary besides solver parameters: name, unit, kind.
 const QUANTITIES: [(&str, &str, QuantityKind); 10] = [
-    ("substeps", "", QuantityKind::Substeps),
-    ("iterations", "", QuantityKind::Iterations),
-    ("velocity_iterations", "", QuantityKind::Velocity),
-    ("relax_iterations", "", QuantityKind::Relax),
-    ("position_iterations", "", QuantityKind::Position),
+    ("substeps", "", QuantityKind::Budget),
+    ("iterations", "", QuantityKind::Budget),
+    ("velocity_iterations", "", QuantityKind::Budget),
+    ("relax_iterations", "", QuantityKind::Budget),
+    ("position_iterations", "", QuantityKind::Budget),
     ("dt", "s", QuantityKind::Dt),
     ("friction", "", QuantityKind::Friction),
     ("mass_ratio", "", QuantityKind::MassRatio),
@@ -41,16 +41,8 @@ const QUANTITIES: [(&str, &str, QuantityKind); 10] = [
 enum QuantityKind {
     /// A parameter of solvers.
     Parameter,
-    /// [`Budget::substeps`]
-    Substeps,
-    /// Velocity sweeps; position sweeps for solvers without velocity sweeps.
-    Iterations,
-    /// [`Budget::velocity_iterations`]
-    Velocity,
-    /// [`Budget::relax_iterations`]
-    Relax,
-    /// [`Budget::position_iterations`]
-    Position,
+    /// A field of the budget. `iterations` are velocity sweeps; position sweeps for solvers without velocity sweeps.
+    Budget,
     /// Step length of the scene (s).
     Dt,
     /// Friction coefficient of every shape (1).
@@ -152,13 +144,13 @@ impl QuantitySweep {
 
     /// Whether this solver has the quantity, or the scene does.
     pub fn concerns(&self, variant: &Variant) -> bool {
-        match self.kind {
-            QuantityKind::Parameter => variant.parameter(self.name).is_ok(),
-            QuantityKind::Velocity => variant.uses.velocity,
-            QuantityKind::Relax => variant.uses.relax,
-            QuantityKind::Position => variant.uses.position,
-            QuantityKind::Iterations => variant.uses.velocity || variant.uses.position,
-            _ => true,
+        let uses = variant.uses;
+        match self.name {
+            "velocity_iterations" => uses.velocity,
+            "relax_iterations" => uses.relax,
+            "position_iterations" => uses.position,
+            "iterations" => uses.velocity || uses.position,
+            name => self.kind != QuantityKind::Parameter || variant.parameter(name).is_ok(),
         }
     }
 
@@ -167,21 +159,19 @@ impl QuantitySweep {
     /// Errors: a list of several values, or a list for the swept quantity.
     pub fn check_grid(&self, grid: &BudgetGrid) -> Result<(), Error> {
         let lists = [
-            ("substeps", &grid.substeps, &[QuantityKind::Substeps][..]),
-            (
-                "velocity-iterations",
-                &grid.velocity_iterations,
-                &[QuantityKind::Velocity, QuantityKind::Iterations],
-            ),
-            ("relax-iterations", &grid.relax_iterations, &[QuantityKind::Relax]),
-            ("position-iterations", &grid.position_iterations, &[QuantityKind::Position]),
+            ("substeps", &grid.substeps),
+            ("velocity-iterations", &grid.velocity_iterations),
+            ("relax-iterations", &grid.relax_iterations),
+            ("position-iterations", &grid.position_iterations),
         ];
-        for (option, list, kinds) in lists {
+        for (option, list) in lists {
             if list.len() > 1 {
                 let message = format!("{} values, but a sweep needs one", list.len());
                 return Err(Error::invalid(format!("--{option}"), message));
             }
-            if !list.is_empty() && kinds.contains(&self.kind) {
+            let is_own = option.replace('-', "_") == self.name
+                || (self.name == "iterations" && option == "velocity-iterations");
+            if !list.is_empty() && is_own {
                 return Err(Error::invalid(format!("--{option}"), format!("--sweep {} sets it", self.name)));
             }
         }
@@ -190,12 +180,12 @@ impl QuantitySweep {
 
     /// The field of the budget that the quantity sets; `None` for other quantities.
     fn field<'b>(&self, budget: &'b mut Budget, variant: &Variant) -> Option<&'b mut u32> {
-        match self.kind {
-            QuantityKind::Substeps => Some(&mut budget.substeps),
-            QuantityKind::Iterations if variant.uses.velocity => Some(&mut budget.velocity_iterations),
-            QuantityKind::Velocity => Some(&mut budget.velocity_iterations),
-            QuantityKind::Relax => Some(&mut budget.relax_iterations),
-            QuantityKind::Position | QuantityKind::Iterations => Some(&mut budget.position_iterations),
+        match self.name {
+            "substeps" => Some(&mut budget.substeps),
+            "iterations" if variant.uses.velocity => Some(&mut budget.velocity_iterations),
+            "velocity_iterations" => Some(&mut budget.velocity_iterations),
+            "relax_iterations" => Some(&mut budget.relax_iterations),
+            "position_iterations" | "iterations" => Some(&mut budget.position_iterations),
             _ => None,
         }
     }

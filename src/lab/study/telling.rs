@@ -1,7 +1,7 @@
 //! Recordings of the scene on which solvers differ most.
 
 use super::answer::Answer;
-use super::curve::solvers_of;
+use super::curve::distinct;
 use super::{Record, StudyPlan};
 use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
@@ -20,45 +20,42 @@ const FRAMES: u32 = 300;
 /// cheapest setting within tolerance, or the one nearest to it, then runs that broke, then others that hold;
 /// each of another solver. Empty in a sweep, whose scenes differ, and without colored runs on a small scene.
 pub fn telling(records: &[Record]) -> Vec<&Record> {
-    if records.iter().any(|r| r.swept.is_some()) {
-        return Vec::new();
-    }
-    let mut best: (usize, usize, Vec<&Record>) = Default::default();
-    for scene in records.chunk_by(|a, b| a.scene == b.scene).filter(|s| s[0].bodies <= LARGEST) {
-        let solvers = solvers_of(scene);
-        let colored = || scene.iter().filter(|r| r.order == Order::Colored);
-        let own = |solver: &'static str| colored().filter(move |r| r.solver == solver);
-        let fails = |solver: &&'static str| own(solver).any(|r| !r.holds());
-        let holds = |solver: &&'static str| own(solver).any(|r| r.holds());
-        let contrast =
-            solvers.iter().filter(|s| fails(s)).count().min(solvers.iter().filter(|s| holds(s)).count());
-        let mut chosen: Vec<&Record> = Vec::new();
-        let answer = Answer::of(scene);
-        let first = answer.as_ref().and_then(|a| {
-            a.good
-                .iter()
-                .copied()
-                .find(|r| r.order == Order::Colored)
-                .or(a.nearest.filter(|r| r.order == Order::Colored))
-        });
-        chosen.extend(first);
-        let mut broken: Vec<&Record> = colored().filter(|r| !r.holds() && r.failure.is_none()).collect();
-        broken.sort_by_key(|r| (r.broken.map_or(0, |b| b.step), Reverse(r.lanes)));
-        let mut others: Vec<&Record> = colored().filter(|r| r.holds()).collect();
-        others.sort_by(|a, b| a.excess().total_cmp(&b.excess()).then(b.lanes.cmp(&a.lanes)));
-        // The earliest failures first, then the most accurate of those that hold.
-        for (list, limit) in [(&broken, MOST - 1), (&others, MOST), (&broken, MOST)] {
-            for record in list {
-                if chosen.len() < limit && chosen.iter().all(|c| c.solver != record.solver) {
-                    chosen.push(record);
-                }
-            }
-        }
-        if !chosen.is_empty() && (contrast, scene[0].bodies) > (best.0, best.1) {
-            best = (contrast, scene[0].bodies, chosen);
+    let is_small = |scene: &&[Record]| scene[0].bodies <= LARGEST && scene[0].swept.is_none();
+    let scenes = records.chunk_by(|a, b| a.scene == b.scene).filter(is_small);
+    let shown = scenes.map(|scene| (contrast(scene), scene[0].bodies, shown(scene)));
+    let shown = shown.filter(|(.., runs)| !runs.is_empty());
+    shown.min_by_key(|&(contrast, bodies, _)| Reverse((contrast, bodies))).map_or(Vec::new(), |most| most.2)
+}
+
+fn is_colored(record: &&Record) -> bool {
+    record.order == Order::Colored
+}
+
+/// The smaller one of the numbers of solvers of which a setting holds, and of which one does not.
+fn contrast(scene: &[Record]) -> usize {
+    let solvers = |holds: bool| {
+        let own = scene.iter().filter(is_colored).filter(|r| r.holds() == holds);
+        distinct(own.map(|r| r.solver)).len()
+    };
+    solvers(true).min(solvers(false))
+}
+
+/// The runs to replay of a scene.
+fn shown(scene: &[Record]) -> Vec<&Record> {
+    let answer = Answer::of(scene);
+    let best = answer.iter().flat_map(|a| a.good.iter().copied().chain(a.nearest)).find(is_colored);
+    let mut others: Vec<&Record> = scene.iter().filter(is_colored).filter(|r| r.failure.is_none()).collect();
+    // The earliest failures first, then the most accurate of those that hold.
+    others.sort_by_key(|r| Reverse(r.lanes));
+    others.sort_by(|a, b| a.excess().total_cmp(&b.excess()));
+    others.sort_by_key(|r| (r.holds(), r.failed_step()));
+    let mut chosen: Vec<&Record> = Vec::new();
+    for record in best.into_iter().chain(others) {
+        if chosen.len() < MOST && chosen.iter().all(|c| c.solver != record.solver) {
+            chosen.push(record);
         }
     }
-    best.2
+    chosen
 }
 
 /// Runs the most telling scene again and records it. Returns the bytes of the files. A run that diverges is

@@ -2,12 +2,13 @@
 
 use crate::lab::chart::scale::number;
 use crate::lab::chart::{Axis, Chart, ChartMark, FailStrip, LineStyle, Scale, Series, Style};
-use crate::lab::report::by_scene;
+use crate::lab::report::by_scene::{self, setting};
 use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, distinct, solvers_of};
+use crate::lab::study::profile::Profile;
 use crate::lab::study::search::LEVELS;
 use crate::lab::study::sweep::Swept;
 use crate::lab::study::{Record, answer};
-use crate::lab::units::{lanes, si};
+use crate::lab::units::si;
 
 /// The records of each scene.
 pub fn scenes(records: &[Record]) -> Vec<&[Record]> {
@@ -32,15 +33,7 @@ fn drawn(record: &Record, axis: ErrorAxis) -> Option<f64> {
     axis.of(record).filter(|_| record.holds()).map(|error| error.max(ERROR_FLOOR))
 }
 
-/// Budget, and order or lane width, as text.
-pub fn words(record: &Record) -> String {
-    match record.order.is_serial() {
-        true => format!("{}, {} order", record.budget_text, record.order.name()),
-        false => format!("{}, {}", record.budget_text, lanes(record.lanes)),
-    }
-}
-
-/// The same, abbreviated: `7·1·1@8`.
+/// Budget, and order or lane width, abbreviated: `7·1·1@8`.
 pub fn short_words(record: &Record) -> String {
     let numbers: Vec<&str> = record.budget_text.split(' ').filter(|w| w.parse::<u32>().is_ok()).collect();
     let width = if record.order.is_serial() { "nat".into() } else { record.lanes.to_string() };
@@ -52,8 +45,17 @@ fn shown(error: f64, unit: &str) -> String {
     if unit.is_empty() || unit == "1" { number(error) } else { si(error, unit) }
 }
 
-fn axis(name: impl Into<String>, scale: Scale) -> Axis {
-    Axis { name: name.into(), scale }
+/// Lower and upper quartile of the time of a step (s).
+fn quartiles(record: &Record) -> Option<[f64; 2]> {
+    record.sample.as_ref().map(|sample| sample.quartiles_ns.map(|ns| (1e-9 * ns).max(1e-12)))
+}
+
+/// A mark of a setting: at (x, y), with what is shown there; in the strip if it has no place.
+fn mark(record: &Record, [x, y]: [Option<f64>; 2], size: f64, what: String, shown: String) -> ChartMark {
+    let fails = x.is_none() || y.is_none();
+    let (size, shown) = if fails { (size.min(3.2), by_scene::verdict(record)) } else { (size, shown) };
+    let at = ChartMark::at(x.unwrap_or(0.0), y.unwrap_or(0.0), size, format!("{what}, {shown}"));
+    ChartMark { fails, hollow: record.order.is_serial(), ..at }
 }
 
 /// Name and unit of an error on a scene; `None` if it has no reference value.
@@ -83,61 +85,41 @@ fn precision_chart(
     let tolerance = error.tolerance(&scene[0].tolerances).map(|t| t.value);
     let x = Scale::log(settings.iter().filter_map(|r| drawn(r, error)).chain(tolerance), unit);
     let y = Scale::log(settings.iter().filter_map(|r| time(r)), "s");
-    let on_front = |r: &Record| match error {
-        ErrorAxis::Penetration => r.front.penetration,
-        ErrorAxis::Law => r.front.law,
-        _ => r.front.truth,
-    };
-    let mut front: Vec<ChartMark> = settings
-        .iter()
-        .filter(|r| on_front(r))
-        .filter_map(|r| Some(ChartMark::at(drawn(r, error)?, time(r)?, 0.0, String::new())))
-        .collect();
-    front.sort_by(|a, b| a.x.total_cmp(&b.x));
-    let front =
-        Series { line: LineStyle::Steps, width: 6, opacity: 0.3, ..Series::line(Style::neutral(), front) };
+    // The settings that no other beats in time and error.
+    let mut placed: Vec<(f64, f64, &Record)> =
+        settings.iter().filter_map(|r| Some((time(r)?, drawn(r, error)?, *r))).collect();
+    placed.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let mut least = f64::INFINITY;
+    placed.retain(|&(_, error, _)| {
+        let is_better = error < least;
+        least = least.min(error);
+        is_better
+    });
+    let on_front = |r: &Record| placed.iter().any(|(.., own)| std::ptr::eq(*own, r));
+    let marks = placed.iter().rev().map(|&(time, error, _)| ChartMark::at(error, time, 0.0, String::new()));
+    let front = Series::line(Style::neutral(), marks.collect());
+    let front = Series { line: LineStyle::Steps, width: 6, opacity: 0.3, ..front };
     let mut series = vec![front];
     for solver in solvers_of(scene) {
         let of = |r: &Record| (r.order.is_serial(), r.impacts, r.frozen);
         for kind in distinct(settings.iter().filter(|r| r.solver == solver).map(|r| of(r))) {
             let own = settings.iter().filter(|r| r.solver == solver && of(r) == kind);
-            let serial = kind.0;
-            let mark = |(i, record): (usize, &&Record)| {
-                let time = time(record)?;
-                let what = format!("{solver}, {}: {}", words(record), si(time, "s"));
-                let size = 3.2 + 0.9 * i.min(4) as f64;
-                let mark = match drawn(record, error) {
-                    Some(value) => {
-                        let quartiles = record.sample.as_ref()?.quartiles_ns.map(|ns| (1e-9 * ns).max(1e-12));
-                        let [low, high] = quartiles.map(|t| si(t, "s"));
-                        let title = format!("{what} (quartiles {low} to {high}), {}", shown(value, unit));
-                        let label = if on_front(record) { short_words(record) } else { String::new() };
-                        ChartMark { bar: Some(quartiles), label, ..ChartMark::at(value, time, size, title) }
-                    }
-                    None => {
-                        let title = format!("{what}, {}", by_scene::verdict(record));
-                        ChartMark { fails: true, ..ChartMark::at(0.0, time, 3.0, title) }
-                    }
-                };
-                Some(ChartMark { hollow: serial, ..mark })
+            let mark = |(i, r): (usize, &&Record)| {
+                let (time, value) = (time(r)?, drawn(r, error));
+                let what = format!("{solver}, {}: {}", setting(r), si(time, "s"));
+                let error = value.map_or(String::new(), |value| shown(value, unit));
+                let mark = mark(r, [value, Some(time)], 3.2 + 0.9 * i.min(4) as f64, what, error);
+                let label = if on_front(r) { short_words(r) } else { String::new() };
+                Some(ChartMark { bar: quartiles(r), label, ..mark })
             };
-            let marks: Vec<ChartMark> = own.enumerate().filter_map(mark).collect();
-            let (failed, held): (Vec<ChartMark>, Vec<ChartMark>) =
-                marks.into_iter().partition(|mark| mark.fails);
-            let style = Style::of(solver);
-            series.push(Series { dashed: serial, ..Series::line(style, held) });
-            series.push(Series::marks(style, failed));
+            let marks = own.enumerate().filter_map(mark);
+            let (failed, held) = marks.partition(|mark: &ChartMark| mark.fails);
+            series.push(Series { dashed: kind.0, ..Series::line(Style::of(solver), held) });
+            series.push(Series::marks(Style::of(solver), failed));
         }
     }
-    Chart {
-        size: [420, 330],
-        title: String::new(),
-        x: axis(name, x),
-        y: axis("time of a step", y),
-        strip: FailStrip::Right,
-        good: [tolerance, None],
-        series,
-    }
+    let chart = Chart::new([420, 330], Axis::new(name, x), Axis::new("time of a step", y), series);
+    Chart { strip: FailStrip::Right, good: [tolerance, None], ..chart }
 }
 
 /// Errors beyond these fractions of the tolerance are drawn at them.
@@ -163,26 +145,16 @@ pub fn overview(records: &[Record]) -> Option<Chart> {
     if dots.is_empty() {
         return None;
     }
-    let mut series = Vec::new();
+    let (mut settings, mut means) = (Vec::new(), Vec::new());
     for solver in solvers_of(records) {
         let own = || dots.iter().filter(|d| d.0.solver == solver);
         let small = own().map(|(r, slower)| {
-            let title = format!("{solver} on {}: {}, {}× the fastest", r.scene, words(r), number(*slower));
-            match wrong(r) {
-                Some(x) => {
-                    ChartMark::at(x, *slower, 2.6, format!("{title}, error {} × tolerance", number(x)))
-                }
-                None => {
-                    let title = format!("{title}: {}", by_scene::verdict(r));
-                    ChartMark { fails: true, ..ChartMark::at(0.0, *slower, 2.6, title) }
-                }
-            }
+            let what = format!("{solver} on {}: {}, {}× the fastest", r.scene, setting(r), number(*slower));
+            let error = wrong(r).map_or(String::new(), |x| format!("error {} × tolerance", number(x)));
+            mark(r, [wrong(r), Some(*slower)], 2.6, what, error)
         });
-        series.push(Series { opacity: 0.42, ..Series::marks(Style::of(solver), small.collect()) });
-    }
-    for solver in solvers_of(records) {
-        let own = || dots.iter().filter(|d| d.0.solver == solver);
-        let mut means: Vec<ChartMark> = Vec::new();
+        settings.push(Series { opacity: 0.42, ..Series::marks(Style::of(solver), small.collect()) });
+        let mut large: Vec<ChartMark> = Vec::new();
         for level in LEVELS {
             let cheapest = |scene: &[Record]| {
                 let within = own().filter(|d| d.0.scene == scene[0].scene && d.0.excess_at(level) <= 1.0);
@@ -202,27 +174,23 @@ pub fn overview(records: &[Record]) -> Option<Chart> {
                 (_, true) => solver.to_string(),
                 (_, false) => format!("{solver}, fails on {} of {of}", of - count),
             };
-            let mark = ChartMark::at(mean(0), mean(1), 5.5 + 1.2 * means.len() as f64, title);
-            means.extend((count > 0).then_some(ChartMark { hollow: count < of, label, ..mark }));
+            let mark = ChartMark::at(mean(0), mean(1), 5.5 + 1.2 * large.len() as f64, title);
+            large.extend((count > 0).then_some(ChartMark { hollow: count < of, label, ..mark }));
         }
-        series.push(Series::line(Style::of(solver), means));
+        means.push(Series::line(Style::of(solver), large));
     }
+    settings.extend(means);
     let x = Scale::log(dots.iter().filter_map(|d| wrong(d.0)).chain([0.1, 10.0]), "");
     let y = Scale::log(dots.iter().map(|d| d.1).chain([1.0, 3.0]), "×");
-    Some(Chart {
-        size: [980, 560],
-        title: String::new(),
-        x: axis("largest error ÷ scene tolerance (≤ 1 passes)", x),
-        y: axis("time of a step, relative to the fastest setting that holds", y),
-        strip: FailStrip::Right,
-        good: [Some(1.0), None],
-        series,
-    })
+    let x = Axis::new("largest error ÷ scene tolerance (≤ 1 passes)", x);
+    let y = Axis::new("time of a step, relative to the fastest setting that holds", y);
+    let chart = Chart::new([980, 560], x, y, settings);
+    Some(Chart { strip: FailStrip::Right, good: [Some(1.0), None], ..chart })
 }
 
 /// The performance profile of each error.
 pub fn profiles(records: &[Record]) -> Vec<Chart> {
-    let chart = |profile: crate::lab::study::profile::Profile| {
+    let chart = |profile: Profile| {
         let most = profile.ratios.iter().flat_map(|(_, r)| r.iter().copied()).fold(2.0, f64::max);
         let (mut x, mut y) = (Scale::log([1.0, most], "×"), Scale::linear(1.0, "%"));
         x.low = 0.95;
@@ -241,93 +209,77 @@ pub fn profiles(records: &[Record]) -> Vec<Chart> {
             let shift = 2 * i as i32 - profile.ratios.len() as i32;
             Series { line: LineStyle::Steps, shift, ..Series::line(Style::of(solver), marks) }
         };
-        Chart {
-            size: [420, 310],
-            title: format!("{} within tolerance", profile.axis.name()),
-            x: axis("time relative to the fastest solver", x),
-            y: axis(format!("share of {} scenes", profile.scenes), y),
-            strip: FailStrip::None,
-            good: [None; 2],
-            series: profile.ratios.iter().enumerate().map(series).collect(),
-        }
+        let x = Axis::new("time relative to the fastest solver", x);
+        let y = Axis::new(format!("share of {} scenes", profile.scenes), y);
+        let chart = Chart::new([420, 310], x, y, profile.ratios.iter().enumerate().map(series).collect());
+        Chart { title: format!("{} within tolerance", profile.axis.name()), ..chart }
     };
     by_scene::profiles(records).into_iter().map(chart).collect()
+}
+
+/// A small chart of a scene with a curve per solver through these records, at these places with these texts.
+fn curves<'a>(
+    scene: &'a [Record],
+    (x, y): (Axis, &str),
+    of_solver: impl Fn(&'static str) -> Vec<&'a Record>,
+    place: impl Fn(&Record) -> Option<([f64; 2], String)>,
+    scale: impl Fn(Vec<f64>) -> Scale,
+) -> Chart {
+    let series = |solver: &'static str| {
+        let mark = |r: &Record| {
+            let ([x, y], shown) = place(r)?;
+            Some(mark(r, [Some(x), Some(y)], 3.5, format!("{solver}, {}", setting(r)), shown))
+        };
+        Series::line(Style::of(solver), of_solver(solver).into_iter().filter_map(mark).collect())
+    };
+    let series: Vec<Series> = solvers_of(scene).into_iter().map(series).collect();
+    let values = series.iter().flat_map(|s| &s.marks).map(|m| m.y).collect();
+    let chart = Chart::new([300, 230], x, Axis::new(y, scale(values)), series);
+    Chart { title: scene[0].scene.clone(), ..chart }
 }
 
 /// Speed-up over one lane, and share of lanes that hold a contact, against the lane width; two charts per scene. Empty
 /// if only one width ran.
 pub fn over_lanes(records: &[Record]) -> Vec<Chart> {
-    let mut widths: Vec<usize> = records.iter().filter(|r| !r.order.is_serial()).map(|r| r.lanes).collect();
-    widths.sort_unstable();
-    widths.dedup();
+    let mut widths = distinct(records.iter().filter(|r| !r.order.is_serial()).map(|r| r.lanes as f64));
+    widths.sort_by(f64::total_cmp);
     let mut charts = Vec::new();
     for scene in scenes(records).into_iter().filter(|_| widths.len() > 1) {
-        let runs = |solver: &str| -> Vec<&Record> {
-            let Some(chosen) = standard(scene, solver).filter(|r| !r.order.is_serial()) else {
-                return Vec::new();
-            };
-            scene.iter().filter(|r| answer::same(r, chosen) && r.sample.is_some()).collect()
+        let own = |solver: &'static str| -> Vec<&Record> {
+            let chosen = standard(scene, solver).filter(|r| !r.order.is_serial());
+            scene.iter().filter(|r| chosen.is_some_and(|chosen| answer::same(r, chosen))).collect()
         };
-        let speed_up = |r: &Record| r.speed_up;
-        let filled = |r: &Record| r.sample.as_ref().map(|sample| sample.load.occupancy);
-        let most = scene.iter().filter_map(|r| r.speed_up).fold(1.0, f64::max);
-        for (name, scale, of) in [
-            ("speed-up over 1 lane", Scale::linear(most, "×"), &speed_up as &dyn Fn(&Record) -> Option<f64>),
-            ("lanes filled", Scale::linear(1.0, "%"), &filled),
-        ] {
-            let series = |solver: &'static str| {
-                let mark = |r: &Record| {
-                    let value = of(r)?;
-                    let title = format!("{solver}, {}: {}", words(r), number(value));
-                    Some(ChartMark::at(r.lanes as f64, value, 3.4, title))
-                };
-                Series::line(Style::of(solver), runs(solver).into_iter().filter_map(mark).collect())
-            };
-            charts.push(Chart {
-                size: [300, 230],
-                title: scene[0].scene.clone(),
-                x: axis("lanes", Scale::steps(&widths)),
-                y: axis(name, scale),
-                strip: FailStrip::None,
-                good: [None; 2],
-                series: solvers_of(records).into_iter().map(series).collect(),
-            });
-        }
+        let x = || Axis::new("lanes", Scale::at(&widths, ""));
+        let place = |r: &Record, value: Option<f64>| {
+            r.sample.as_ref()?;
+            Some(([r.lanes as f64, value?], number(value?)))
+        };
+        let most = |values: Vec<f64>| values.into_iter().fold(1.0, f64::max);
+        let speed_up = |values| Scale::linear(most(values), "×");
+        charts.push(curves(scene, (x(), "speed-up over 1 lane"), own, |r| place(r, r.speed_up), speed_up));
+        let filled = |r: &Record| place(r, r.sample.as_ref().map(|sample| sample.load.occupancy));
+        charts.push(curves(scene, (x(), "lanes filled"), own, filled, |_| Scale::linear(1.0, "%")));
     }
     charts
 }
 
 /// Sweeps of a step over the constraints against penetration and residual; two charts per scene.
 pub fn iterations(records: &[Record]) -> Vec<Chart> {
-    let mut charts = Vec::new();
-    for scene in scenes(records) {
-        for error in [ErrorAxis::Penetration, ErrorAxis::Law] {
-            let unit = error.unit(scene);
-            let series = |solver: &'static str| {
-                let own = answer::each_setting(scene)
-                    .into_iter()
-                    .filter(|r| r.solver == solver && !r.order.is_serial());
-                let mark = |r: &Record| {
-                    let (sweeps, value) = (r.sample.as_ref()?.load.sweeps.max(0.5), drawn(r, error)?);
-                    let what = format!("{solver}, {}: {} sweeps", r.budget_text, number(sweeps));
-                    Some(ChartMark::at(sweeps, value, 3.6, format!("{what}, {}", shown(value, unit))))
-                };
-                Series::line(Style::of(solver), own.filter_map(mark).collect())
-            };
-            let series: Vec<Series> = solvers_of(records).into_iter().map(series).collect();
-            let marks = || series.iter().flat_map(|s| &s.marks);
-            charts.push(Chart {
-                size: [300, 230],
-                title: scene[0].scene.clone(),
-                x: axis("sweeps of a step", Scale::log(marks().map(|m| m.x), "")),
-                y: axis(error.name(), Scale::log(marks().map(|m| m.y), unit)),
-                strip: FailStrip::None,
-                good: [None; 2],
-                series,
-            });
-        }
-    }
-    charts
+    let chart = |scene: &[Record], error: ErrorAxis| {
+        let unit = error.unit(scene);
+        let settings: Vec<&Record> =
+            answer::each_setting(scene).into_iter().filter(|r| !r.order.is_serial()).collect();
+        let sweeps = |r: &Record| Some(r.sample.as_ref()?.load.sweeps.max(0.5));
+        let x = Axis::new("sweeps of a step", Scale::log(settings.iter().filter_map(|r| sweeps(r)), ""));
+        let own = |solver| settings.iter().copied().filter(|r| r.solver == solver).collect();
+        let place = |r: &Record| {
+            let (sweeps, value) = (sweeps(r)?, drawn(r, error)?);
+            Some(([sweeps, value], format!("{} sweeps, {}", number(sweeps), shown(value, unit))))
+        };
+        curves(scene, (x, error.name()), own, place, |values| Scale::log(values, unit))
+    };
+    let both = |scene| [ErrorAxis::Penetration, ErrorAxis::Law].map(|error| chart(scene, error));
+    scenes(records).into_iter().flat_map(both).collect()
 }
 
 /// Time and each error of a scene against the swept value, a curve per solver.
@@ -350,51 +302,33 @@ fn sweep_chart(scene: &[Record], swept: Swept, error: Option<ErrorAxis>, unit: &
     let at = |r: &Record| r.swept.map_or(0.0, |s| s.value);
     let tolerance = |r: &Record| error.and_then(|e| e.tolerance(&r.tolerances)).map(|t| t.value);
     let limit = tolerance(&scene[0]);
-    let mut values: Vec<f64> = scene.iter().map(at).collect();
+    let mut values = distinct(scene.iter().map(at));
     values.sort_by(f64::total_cmp);
-    values.dedup();
     let mut series = Vec::new();
-    for solver in solvers_of(scene) {
-        for serial in [true, false] {
-            let mut own: Vec<&&Record> =
-                settings.iter().filter(|r| r.solver == solver && r.order.is_serial() == serial).collect();
-            own.sort_by(|a, b| at(a).total_cmp(&at(b)));
-            let mark = |r: &&&Record| {
-                let what = format!("{solver}, {} {} {}, {}", swept.name, number(at(r)), swept.unit, words(r));
-                let mark = match value(r) {
-                    Some(y) => {
-                        let quartiles =
-                            r.sample.as_ref().map(|s| s.quartiles_ns.map(|ns| (1e-9 * ns).max(1e-12)));
-                        let bar = quartiles.filter(|_| error.is_none() && !is_dt);
-                        let text = if unit == "s" { si(y, "s") } else { shown(y, unit) };
-                        ChartMark { bar, ..ChartMark::at(at(r), y, 3.8, format!("{what}: {text}")) }
-                    }
-                    None => {
-                        let title = format!("{what}: {}", by_scene::verdict(r));
-                        ChartMark { fails: true, ..ChartMark::at(at(r), 0.0, 3.2, title) }
-                    }
-                };
-                ChartMark { hollow: serial, ..mark }
-            };
-            let marks = own.iter().map(mark).collect();
-            series.push(Series { dashed: serial, ..Series::line(Style::of(solver), marks) });
-        }
+    for (solver, serial) in solvers_of(scene).into_iter().flat_map(|s| [(s, true), (s, false)]) {
+        let is_own = |r: &&&Record| r.solver == solver && r.order.is_serial() == serial;
+        let mut own: Vec<&&Record> = settings.iter().filter(is_own).collect();
+        own.sort_by(|a, b| at(a).total_cmp(&at(b)));
+        let mark = |r: &&&Record| {
+            let what = format!("{solver}, {} {} {}, {}", swept.name, number(at(r)), swept.unit, setting(r));
+            let y = value(r);
+            let text = y.map_or(String::new(), |y| if unit == "s" { si(y, "s") } else { shown(y, unit) });
+            let bar = quartiles(r).filter(|_| error.is_none() && !is_dt);
+            ChartMark { bar, ..mark(r, [Some(at(r)), y], 3.8, what, text) }
+        };
+        let marks = own.iter().map(mark).collect();
+        series.push(Series { dashed: serial, ..Series::line(Style::of(solver), marks) });
     }
     let name = match error {
         Some(error) => error.name(),
         None if is_dt => "time per second of the scene",
         None => "time of a step",
     };
-    Chart {
-        size: [330, 290],
-        title: String::new(),
-        x: axis(swept.name, Scale::at(&values, swept.unit)),
-        y: axis(name, Scale::log(settings.iter().filter_map(|r| value(r)).chain(limit), unit)),
-        strip: FailStrip::Top,
-        // In some scenes the tolerance depends on the swept value.
-        good: [None, limit.filter(|_| settings.iter().all(|r| tolerance(r) == limit))],
-        series,
-    }
+    let x = Axis::new(swept.name, Scale::at(&values, swept.unit));
+    let y = Axis::new(name, Scale::log(settings.iter().filter_map(|r| value(r)).chain(limit), unit));
+    // In some scenes the tolerance depends on the swept value.
+    let good = [None, limit.filter(|_| settings.iter().all(|r| tolerance(r) == limit))];
+    Chart { strip: FailStrip::Top, good, ..Chart::new([330, 290], x, y, series) }
 }
 
 #[cfg(test)]

@@ -55,10 +55,6 @@ fn shade(margin: f64, passed: bool) -> (String, bool) {
     (format!("#{r:02x}{g:02x}{b:02x}"), light < 130.0)
 }
 
-fn margin_of(outcome: &MatrixCell) -> f64 {
-    outcome.margin.as_f64().unwrap_or(f64::INFINITY)
-}
-
 fn word(value: &Value) -> String {
     value.as_f64().map_or_else(|| value.as_str().unwrap_or("–").to_string(), number)
 }
@@ -83,25 +79,13 @@ pub fn matrix(matrix: &VerifyFile) -> Vec<DocBlock> {
 
 fn cell_of(outcome: &MatrixCell) -> DocCell {
     let Some(passed) = outcome.passed else { return "n/a".into() };
-    let margin = margin_of(outcome);
+    let margin = outcome.margin.as_f64().unwrap_or(f64::INFINITY);
     let (color, white) = shade(margin, passed);
     let sign = if passed { "" } else { "✗ " };
-    let shown = if margin.is_finite() { short(margin) } else { "∞".into() };
+    let shown = if margin.is_finite() { number(margin) } else { "∞".into() };
     let [measured, reference, tolerance] =
         [&outcome.measured, &outcome.reference, &outcome.tolerance].map(word);
     let numbers = format!("measured {measured}, reference {reference} ± {tolerance}");
     let css = format!("background:{color};color:{}", if white { "#fff" } else { "#1f2933" });
     DocCell { css, title: outcome.reason.clone().unwrap_or(numbers), ..format!("{sign}{shown}").into() }
-}
-
-/// A number with two digits.
-fn short(margin: f64) -> String {
-    match margin {
-        0.0 => "0".into(),
-        m if m < 0.01 => "< .01".into(),
-        m if m < 10.0 => format!("{m:.2}"),
-        m if m < 1000.0 => format!("{m:.0}"),
-        m if m < 9950.0 => format!("{:.1}k", 1e-3 * m),
-        m => number(m),
-    }
 }

@@ -25,7 +25,6 @@ use crate::lab::study::Record;
 use crate::lab::study::curve::solvers_of;
 use crate::lab::units::{bodies, count, digits};
 use matrix::VerifyFile;
-use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Name of the page in the folder of a study.
@@ -91,7 +90,7 @@ fn sections(
     let records = &study.records[..];
     let solvers = solvers_of(records);
     let legend = || DocBlock::Html(legend(solvers.iter().map(|s| (*s, Style::of(s)))));
-    let machine = ("machine", "Machine, settings and command", vec![DocBlock::Html(machine(study))]);
+    let machine = ("machine", "Machine, settings and command", machine(study));
     if let Some(swept) = records.iter().find_map(|r| r.swept) {
         let lead = format!(
             "Time and errors against {}, one curve per solver. A mark is a setting at its fastest lane width; hollow marks are in natural order. Bars are the quartiles of the blocks of steps. The shaded side is within the scene’s tolerance. Settings that fail are in the strip “fails” at the top and break the curve. The settings of a scene were timed interleaved.",
@@ -101,9 +100,9 @@ fn sections(
         for scene in charts::scenes(records) {
             blocks.push(DocBlock::Heading(scene[0].scene.clone(), by_scene::scene_line(scene)));
             blocks.push(DocBlock::Charts("four", charts::sweep(scene, swept)));
-            blocks.push(plain(&sweep::reached(scene, swept)));
+            blocks.push(plain(&sweep::reached(scene)));
             let folded = "All settings of this scene".to_string();
-            blocks.push(DocBlock::Table(DocTable { folded, ..sweep::scene_table(scene, swept) }));
+            blocks.push(DocBlock::Table(DocTable { folded, ..by_scene::scene_table(scene).0 }));
         }
         return vec![("sweep", "Sweep", blocks), machine];
     }
@@ -153,7 +152,7 @@ fn sections(
     }
     by_scenes.push(DocBlock::Text(Tone::Soft, by_scene::LEGEND.to_string()));
     made.push(("scenes", "Scene by scene", by_scenes));
-    let mut profiles = vec![
+    let profiles = vec![
         plain(
             "The share of scenes that a solver solves within a factor of the fastest. Upper left is better. Lines that coincide are drawn beside each other.",
         ),
@@ -161,12 +160,11 @@ fn sections(
         DocBlock::Charts("three", charts::profiles(records)),
         DocBlock::Table(by_scene::profile_table(records)),
     ];
-    profiles.extend(by_scene::order_tables(records).into_iter().map(DocBlock::Table));
     made.push(("profiles", "Performance profiles", profiles));
     let compared = by_scene::treatment_tables(records);
     if !compared.is_empty() {
         let tables = compared.into_iter().map(DocBlock::Table).collect();
-        made.push(("treatments", "Impacts and frozen contacts", tables));
+        made.push(("treatments", "Impacts, frozen contacts and orders", tables));
     }
     let lanes = charts::over_lanes(records);
     if !lanes.is_empty() {
@@ -250,89 +248,30 @@ fn page(study: &StudyFile, matrix: Option<&VerifyFile>, recordings: &[(Vec<u8>, 
     )
 }
 
-fn machine(study: &StudyFile) -> String {
+fn machine(study: &StudyFile) -> Vec<DocBlock> {
     let e = &study.environment;
-    let rows = [
+    let mut facts = DocTable { class: "facts", ..DocTable::new("", 2, &[]) };
+    for (name, value) in [
         ("processor", format!("{}, {} in use", e.cpu, e.processors)),
         ("system", format!("{} on {}", e.architecture, e.system)),
         ("compiler", e.compiler.clone()),
         ("instructions", e.target_features.join(" ")),
         ("native lanes", e.native_lanes.to_string()),
         ("version", format!("{}, commit {}", e.version, e.commit)),
-        ("command", command(&study.settings)),
-    ];
-    let mut text = String::from("<table class=\"facts\"><tbody>\n");
-    for (name, value) in rows {
-        let value = escaped(&value);
-        let value = if name == "command" { format!("<code>{value}</code>") } else { value };
-        text += &format!("<tr><th>{name}<td>{value}</tr>\n");
+        ("command", study.command.clone()),
+    ] {
+        facts.row([name.to_string(), value]);
     }
-    let settings = serde_json::to_string_pretty(&study.settings).unwrap_or_default();
-    text + &format!(
-        "</tbody></table>\n<details><summary>Every setting</summary>\n<pre>{}</pre></details>\n",
-        escaped(&settings)
-    )
-}
-
-/// The command that repeats a study with these settings.
-fn command(settings: &Value) -> String {
-    let plain = |v: &Value| v.as_str().map_or_else(|| v.to_string(), str::to_string);
-    let list = |v: &Value| v.as_array().map_or_else(Vec::new, |a| a.iter().map(plain).collect::<Vec<_>>());
-    let mut words = vec!["simpulse study".to_string()];
-    let mut option = |name: &str, values: Vec<String>| {
-        if !values.is_empty() {
-            words.push(format!("--{name} {}", values.join(",")));
-        }
-    };
-    // The settings that `--quick` shortens have no options of their own.
-    let quick = settings["timing_steps"].as_u64().is_some_and(|n| n < 100);
-    option("scenes", list(&settings["scenes"]));
-    let solvers = settings["solvers"]
-        .as_array()
-        .map_or_else(Vec::new, |a| a.iter().map(|s| plain(&s["name"])).collect());
-    option("solvers", solvers);
-    option("lanes", list(&settings["lanes"]));
-    option("orders", list(&settings["orders"]));
-    option("impacts", list(&settings["impacts"]));
-    list(&settings["frozen"]).into_iter().for_each(|limits| option("frozen", vec![limits]));
-    for name in ["substeps", "velocity_iterations", "relax_iterations", "position_iterations"] {
-        option(&name.replace('_', "-"), list(&settings["budgets"][name]));
-    }
-    let set = settings["set"].as_array().map_or_else(Vec::new, |a| {
-        a.iter().map(|o| format!("{}={}", plain(&o["name"]), plain(&o["value"]))).collect()
-    });
-    option("set", set);
-    let sweep = &settings["sweep"];
-    if sweep.is_object() {
-        let values = sweep["values"].as_array().into_iter().flatten().filter_map(Value::as_f64);
-        let values: Vec<String> = values.map(|v| v.to_string()).collect();
-        option("sweep", vec![format!("{}={}", plain(&sweep["name"]), values.join(","))]);
-    }
-    let options = [
-        ("penetration", "penetration", "m"),
-        ("residual", "residual", ""),
-        ("reference", "reference", ""),
-        ("rest_speed", "rest-speed", "m/s"),
-    ];
-    let given = |(name, option, unit): &(&str, &str, &str)| {
-        settings["tolerance"][name].as_f64().map(|v| format!("{option}={v}{unit}"))
-    };
-    option("tolerance", options.iter().filter_map(given).collect());
-    for name in ["steps", "repeats", "seed"] {
-        let value = &settings[name];
-        option(name, if value.is_u64() { vec![value.to_string()] } else { Vec::new() });
-    }
-    if quick {
-        words.insert(1, "--quick".into());
-    }
-    words.join(" ")
+    let settings = escaped(&serde_json::to_string_pretty(&study.settings).unwrap_or_default());
+    let settings = format!("<details><summary>Every setting</summary>\n<pre>{settings}</pre></details>\n");
+    vec![DocBlock::Table(facts), DocBlock::Html(settings)]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::lab::study::record::tests::{failed, fell, record, tolerances};
-    use crate::lab::study::{Record, StudyPlan, TruthError, mark_fronts};
+    use crate::lab::study::{Record, StudyPlan, TruthError};
 
     fn records() -> Vec<Record> {
         let truth = TruthError { quantity: "load of <ground>", unit: "N", expected: 100.0, error: Some(2e3) };
@@ -343,7 +282,7 @@ mod tests {
             tolerances: tolerances().percent(1e7),
             ..record(8, substeps, time, error)
         };
-        let mut records = vec![
+        vec![
             record(8, 1, 10.0, 0.1),
             record(8, 2, 20.0, 0.001),
             record(1, 2, 60.0, 0.001),
@@ -351,13 +290,12 @@ mod tests {
             failed(8),
             soft(1, 12.0, 0.05),
             soft(2, 25.0, 0.002),
-        ];
-        mark_fronts(&mut records);
-        records
+        ]
     }
 
     fn read(records: &[Record]) -> StudyFile {
-        StudyFile::new(&StudyPlan::quick(), records.to_vec(), vec!["arch".into()])
+        let study = StudyFile::new(&StudyPlan::quick(), records.to_vec(), vec!["arch".into()]);
+        StudyFile { command: "simpulse study --quick --scenes 'my scene.json'".into(), ..study }
     }
 
     /// Whether every opened element is closed, in order; cells and rows may close implicitly.
@@ -379,19 +317,6 @@ mod tests {
             }
         }
         open.is_empty()
-    }
-
-    #[test]
-    fn the_command_has_the_options_of_the_command_line() {
-        let mut plan = StudyPlan { sweep: Some("friction=0.5,0".parse().unwrap()), ..StudyPlan::default() };
-        plan.tolerances.penetration = Some(0.005);
-        plan.tolerances.truth = Some(3.0);
-        let command = command(&StudyFile::new(&plan, Vec::new(), Vec::new()).settings);
-        for part in
-            [" --sweep friction=0,0.5 ", " --tolerance penetration=0.005m,reference=3 ", " --repeats 3 "]
-        {
-            assert!(command.contains(part), "{part}: {command}");
-        }
     }
 
     #[test]
@@ -442,7 +367,7 @@ mod tests {
             {"case":"A1","solver":"b","passed":false,"margin":"inf","reason":"diverged"},
             {"case":"A1","solver":"c","passed":null,"reason":"n/a"}]}"#;
         let text = doc::html(&matrix::matrix(&serde_json::from_str(json).unwrap()));
-        for part in ["A1*", ">0.50", "✗ ∞", "n/a", "measured 1, reference 1 ± 2"] {
+        for part in ["A1*", ">0.5<", "✗ ∞", "n/a", "measured 1, reference 1 ± 2"] {
             assert!(text.contains(part), "{part}: {text}");
         }
         assert!(text.contains("background:#93c1dd"), "{text}");
