@@ -4,7 +4,6 @@
 
 use crate::constraints::numerics::small::solve;
 use crate::lanes::Lanes;
-use serde::{Deserialize, Serialize};
 
 /// How the error of a row changes with velocities; see `constraints/joints/rows.rs`.
 #[derive(Clone, Copy, Debug)]
@@ -52,8 +51,9 @@ impl<L: Lanes> Jacobian<L> {
 }
 
 /// The law of a block. `RowLaw<()>` is its kind.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
 pub enum RowLaw<L> {
     /// C = 0.
     Rigid,
@@ -73,7 +73,7 @@ pub enum RowLaw<L> {
         /// D (1)
         damping: L,
         /// F h, if bounded.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
         cap: Option<L>,
     },
 }
