@@ -2,7 +2,7 @@
 
 use super::output::{note, print, print_json, value};
 use super::progress::Bar;
-use super::values::{BudgetArgs, FrozenArgs, SettingArgs};
+use super::values::SettingArgs;
 use super::verify::VerifyArgs;
 use crate::engine::solvers::{DEFAULT, Variant, find};
 use crate::engine::world::Settings;
@@ -59,21 +59,7 @@ impl FromStr for RandomScenes {
 /// The group of all options that need `--random`: without it, nothing would come of them.
 pub const OPTIONS: &str = "random_options";
 
-const NEED_RANDOM: [&str; 13] = [
-    "seed",
-    "families",
-    "continuous",
-    "substeps",
-    "velocity_iterations",
-    "relax_iterations",
-    "position_iterations",
-    "set",
-    "frozen",
-    "keep",
-    "log",
-    "pace",
-    "allow",
-];
+const NEED_RANDOM: [&str; 6] = ["seed", "families", "keep", "log", "pace", "allow"];
 
 /// Options of random scenes.
 #[derive(Args, Clone, Debug)]
@@ -90,15 +76,6 @@ pub struct RandomArgs {
     /// Families of scenes [default: all]
     #[arg(long, value_delimiter = ',', value_name = "FAMILY,…", value_parser = family_value())]
     pub families: Vec<&'static Family>,
-    /// Continuous collision: stop fast bodies at the surfaces that they would pass through [default: the solver's]
-    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
-    pub continuous: Option<bool>,
-    /// Budget and parameters
-    #[command(flatten)]
-    pub work: BudgetArgs,
-    /// Frozen contacts
-    #[command(flatten)]
-    pub frozen: FrozenArgs,
     /// Write every scene that fails, minimized, into this folder
     #[arg(long, value_name = "DIR")]
     pub keep: Option<PathBuf>,
@@ -115,12 +92,13 @@ pub struct RandomArgs {
 }
 
 impl VerifyArgs {
-    fn settings(&self, solver: &'static Variant) -> Result<Settings, Error> {
-        let RandomArgs { work, frozen, .. } = self.random.clone();
+    /// The settings of a solver in every scene. Errors: as [`SettingArgs::settings`].
+    pub fn settings(&self, solver: &'static Variant) -> Result<Settings, Error> {
+        let (work, frozen) = (self.work.clone(), self.frozen);
         let (impacts, without) = (self.impacts, self.without.clone());
         let own = SettingArgs { solver, work, impacts, frozen, without };
         let own = own.settings()?;
-        Ok(Settings { continuous: self.random.continuous.unwrap_or(own.continuous), ..own })
+        Ok(Settings { continuous: self.continuous.unwrap_or(own.continuous), ..own })
     }
 
     /// Name of a solver in rows, with the options that differ from its defaults.
@@ -138,7 +116,7 @@ impl VerifyArgs {
         if own.frozen != Default::default() {
             name += &format!(", frozen {}", own.frozen);
         }
-        match self.random.continuous {
+        match self.continuous {
             Some(true) if !solver.continuous => name += ", continuous",
             Some(false) if solver.continuous => name += ", not continuous",
             _ => {}

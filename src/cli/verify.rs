@@ -3,7 +3,7 @@
 use super::output::{self, finite, print_json, value};
 use super::progress::Bar;
 use super::random::{self, RandomArgs};
-use super::values::{self, ImpactArgs, Solvers, WithoutArgs};
+use super::values::{self, BudgetArgs, FrozenArgs, ImpactArgs, Solvers, WithoutArgs};
 use crate::engine::constraints::Impacts;
 use crate::engine::solvers::{DEFAULT, VARIANTS, Variant};
 use crate::lab::ablate;
@@ -19,8 +19,8 @@ use std::process::ExitCode;
 
 /// Run the hard test cases with known analytic answers, or random scenes
 ///
-/// Every case runs with every solver at its standard budget and compares one number with its
-/// reference value. Failures are shown as failures. `--without all` leaves out each mechanism of the solvers
+/// Every case runs with every solver and compares one number with its reference value. Cases that set their own
+/// substeps keep them. Failures are shown as failures. `--without all` leaves out each mechanism of the solvers
 /// in turn and lists the cases that are then lost. `--random N` runs random scenes instead of the cases and
 /// counts failures that no solver may have.
 #[derive(Args, Clone, Debug)]
@@ -40,6 +40,7 @@ Examples:
   simpulse verify --cases A1,B4.heavy --solvers pgs,soft_step
   simpulse verify --solvers all --json > verify.json
   simpulse verify --list
+  simpulse verify --solvers shim --substeps 8              what fewer substeps cost
   simpulse verify --solvers shim --without all             what each mechanism is for
   simpulse verify --random 10000 --log random.jsonl        ten thousand scenes; run again, it continues
   simpulse verify --random 200 --families driven,fast --solvers soft_step,shim --keep failed/
@@ -58,6 +59,15 @@ pub struct VerifyArgs {
     /// Mechanisms
     #[command(flatten)]
     pub without: WithoutArgs,
+    /// Continuous collision: stop fast bodies at the surfaces that they would pass through [default: the solver's]
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    pub continuous: Option<bool>,
+    /// Budget and parameters
+    #[command(flatten)]
+    pub work: BudgetArgs,
+    /// Frozen contacts
+    #[command(flatten)]
+    pub frozen: FrozenArgs,
     /// Print JSON instead of text: everything that was measured
     #[arg(long)]
     pub json: bool,
@@ -98,11 +108,9 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
     let note = values::left_out(&solvers);
     let bar = Bar::new();
     let tell = |done, total, what: &str| bar.show(done, total, what);
-    let without = solvers
-        .iter()
-        .map(|v| Ok((v.name, args.without.of(v)?)))
-        .collect::<Result<HashMap<_, _>, Error>>()?;
-    let lab = |v: &'static Variant| Lab::new(v).impacts(impacts).without(without[v.name]);
+    let settings =
+        solvers.iter().map(|v| Ok((v.name, args.settings(v)?))).collect::<Result<HashMap<_, _>, Error>>()?;
+    let lab = |v: &'static Variant| Lab::with(settings[v.name].clone());
     let matrix = verify::run(cases, solvers, args.threads(), lab, &tell);
     drop(bar);
     if args.json {

@@ -59,6 +59,7 @@ pub mod rapier;
 pub mod sap;
 pub mod shim;
 pub mod shock;
+pub mod soft_block;
 pub mod soft_step;
 pub mod sor;
 pub mod split_impulse;
@@ -70,7 +71,7 @@ pub mod tgs_sticky;
 pub mod xpbd;
 
 /// Every solver of the crate.
-pub static VARIANTS: [&Variant; 34] = [
+pub static VARIANTS: [&Variant; 35] = [
     &projection::SOLVER,
     &pgs::SOLVER,
     &pgs_ngs::SOLVER,
@@ -100,6 +101,7 @@ pub static VARIANTS: [&Variant; 34] = [
     &xpbd::SOLVER,
     &avbd::SOLVER,
     &soft_step::SOLVER,
+    &soft_block::SOLVER,
     &shim::SOLVER,
     &box2d::SOLVER,
     &rapier::SOLVER,

@@ -4,12 +4,12 @@
 //! **Source.** `papers/shim.md` (*derived*), on the schedule of `catto2024solver2d`.
 //!
 //! **Departures.** The frequency of springs is a fixed fraction of the substep rate, and springs carry their
-//! load at any depth. Additions to [`super::soft_step`], in `shim/`:
+//! load at any depth. Additions to [`super::soft_step`]:
 //!
-//! * `rest/`: springs are shortened for static loads, found by projected Gauss-Seidel and handed down by body;
-//! * `jams.rs`: bodies caught in another body, or between a piston and a wall, start the step without impulses,
+//! * `shim/rest/`: springs are shortened for static loads, found by projected Gauss-Seidel and handed down by body;
+//! * `constraints/step/jams.rs`: bodies caught in another body, or between a piston and a wall, start the step without impulses,
 //!   and their speed is limited to what the piston can give them;
-//! * `frames.rs`: rolling contacts use the frame of the middle of the step;
+//! * `constraints/kernels/rolling.rs`: rolling contacts use the frame of the middle of the step;
 //! * chains of joints that hang from a fixed body are solved directly (`constraints/joints/chains`);
 //! * contacts between bodies of unequal masses are damped more and over-relaxed (`rules/variations.rs`, `Between`);
 //! * approaching bodies bounce or stop before the step, island by island (`constraints/impacts/spread`).
@@ -26,25 +26,23 @@
 //! another contact within a step (B23.release, B23.rolling). Some heavy bodies rock on light ones for many
 //! seconds.
 
-mod frames;
-mod jams;
 mod rest;
 
 use super::{Guarantee, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::impacts::spread::VISITS;
 use crate::constraints::joints::chains::{ChainStage, Chains};
+use crate::constraints::kernels::rolling::{Roll, STEADY};
 use crate::constraints::kernels::velocity::rules::{Bearing, Between, Relaxed, Rigid, Soft};
 use crate::constraints::records::kept::StateSize;
+use crate::constraints::step::jams::Jams;
 use crate::constraints::step::{Collision, CollisionScene};
 use crate::constraints::{ImpactLaw, ImpactWaves, Passes, Solver};
 use crate::lanes::BodyRow;
 use crate::narrowphase::batch::PairKind;
 use crate::narrowphase::circles::Rolling;
 use crate::params::{Budget, Mechanism, Parameter};
-use frames::Roll;
 use glam::Vec2;
-use jams::Jams;
 use rest::hand_down::PropagateLoads;
 use rest::{PER_CONTACT, PRELOAD, REST_TIME};
 use std::f32::consts::TAU;
@@ -181,7 +179,7 @@ fn visits(substeps: u32) -> usize {
 impl Solver for Shim {
     fn before_collision(&mut self, scene: &mut CollisionScene<'_>, collision: &mut Collision) {
         if !scene.without.leaves_out(part::FRAMES) {
-            collision.rolling = Some(Rolling { limit: frames::STEADY * scene.length_unit });
+            collision.rolling = Some(Rolling { limit: STEADY * scene.length_unit });
         }
     }
 
@@ -218,8 +216,7 @@ impl Solver for Shim {
         let relaxed = Between { equal: rigid, unequal: Relaxed { rule: rigid, factor: relaxation } };
         if self.rolls && passes.has(part::FRAMES) {
             let middle = 0.5 * (1.0 - 1.0 / budget.substeps as f32) * dt;
-            passes
-                .run(Phase::Prepare, &mut Roll { middle, dt, steady: frames::STEADY * passes.length_unit() });
+            passes.run(Phase::Prepare, &mut Roll { middle, dt, steady: STEADY * passes.length_unit() });
         }
         self.impacts(passes);
         if passes.has(part::STATICS) {
@@ -296,6 +293,7 @@ impl Shim {
             passes.spread_impacts(ImpactWaves {
                 timed: passes.has(part::MOMENT),
                 inelastic_except: Some(&self.joined),
+                writes_rows: true,
                 releases: passes.has(part::RELEASE),
                 visits: visits(passes.budget().substeps),
             });

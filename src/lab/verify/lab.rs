@@ -37,7 +37,12 @@ pub struct Lab {
 impl Lab {
     /// A laboratory for `solver` with its standard settings.
     pub fn new(solver: &'static Variant) -> Self {
-        Lab { settings: Settings { record_impulses: true, ..Settings::new(solver) }, change: None }
+        Self::with(Settings::new(solver))
+    }
+
+    /// A laboratory whose scenes run with `settings`. Cases that need their own budget or step set them.
+    pub fn with(settings: Settings) -> Self {
+        Lab { settings: Settings { record_impulses: true, ..settings }, change: None }
     }
 
     /// Uses another treatment of impacts.

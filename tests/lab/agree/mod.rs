@@ -58,7 +58,7 @@ fn most(solver: &str) -> u32 {
 /// by 6·10⁻⁸, and in the worst case the errors add up.
 const ROUNDING: f64 = 6e-5;
 
-/// Mechanisms of `shim` that are left out in the comparison.
+/// Mechanisms of `shim` and `soft_block` that are left out in the comparison.
 const WITHOUT: [&str; 4] = ["statics", "frames", "impacts", "jams"];
 
 /// The cells of a solver in sources.md: its source at its best, departures that the method in `f64` can undo,
@@ -113,8 +113,7 @@ fn problems() -> [ContactProblem; 3] {
 
 /// Mechanisms of a solver that are left out in the comparison.
 fn left_out(variant: &Variant) -> Without {
-    let names = WITHOUT.iter().filter(|_| variant.name == "shim");
-    names.map(|name| variant.mechanism(name).unwrap()).fold(Without::default(), Without::and)
+    WITHOUT.iter().filter_map(|name| variant.mechanism(name).ok()).fold(Without::default(), Without::and)
 }
 
 /// Compares one solver with its method, which makes the mistake `fault`.

@@ -14,6 +14,7 @@ pub mod pass;
 pub mod position;
 #[doc(hidden)]
 pub mod prepare;
+pub(crate) mod rolling;
 pub mod stages;
 pub mod types;
 pub mod velocity;

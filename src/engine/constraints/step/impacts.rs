@@ -19,6 +19,9 @@ pub(crate) struct ImpactWaves<'a> {
     /// If set, points that do not bounce are stopped, except those of these bodies, which also stay where
     /// they are (`[bodies]`, or empty). If `None`, nothing is stopped.
     pub inelastic_except: Option<&'a [bool]>,
+    /// Whether rows take over the frames and arms of impacts, and lose the overlap of points that have bounced. If not,
+    /// impacts write bodies and nothing else.
+    pub writes_rows: bool,
     /// Whether to apply the loads that points carried until an impact released them.
     pub releases: bool,
     /// Limit of visits for each of the first points of an island; [`VISITS`] where time does not matter.
@@ -28,7 +31,7 @@ pub(crate) struct ImpactWaves<'a> {
 impl Passes<'_> {
     /// Lets approaching points bounce or stop, before the step.
     pub(crate) fn spread_impacts(&mut self, spreading: ImpactWaves<'_>) {
-        let ImpactWaves { timed, inelastic_except, releases, visits } = spreading;
+        let ImpactWaves { timed, inelastic_except, writes_rows, releases, visits } = spreading;
         let (h, dt, slop) = (self.h(), self.dt(), self.slop());
         let bounces = self.law() != ImpactLaw::None;
         if self.contacts.is_empty() {
@@ -56,6 +59,7 @@ impl Passes<'_> {
             slop,
             timed,
             joined: inelastic_except.unwrap_or_default(),
+            writes_rows,
             releases,
             visits,
             record_impulses: self.input.record_impulses,
@@ -84,6 +88,7 @@ impl Passes<'_> {
                 self.spread_impacts(ImpactWaves {
                     timed: false,
                     inelastic_except: None,
+                    writes_rows: true,
                     releases: true,
                     visits: VISITS,
                 });

@@ -8,6 +8,7 @@ pub mod assign;
 mod bodies;
 mod drifts;
 mod impacts;
+pub(crate) mod jams;
 mod solver;
 mod sweeps;
 mod vectors;

@@ -149,9 +149,11 @@ impl ImpactPropagation {
             begin = end;
         }
         for point in self.points.iter().filter(|point| point.given != [0.0; 2]) {
-            on.put(point);
-            if point.role == Role::Left {
-                on.leave(point);
+            if on.writes_rows {
+                on.put(point);
+                if point.role == Role::Left {
+                    on.leave(point);
+                }
             }
             if on.record_impulses {
                 let contact = on.contact_of(point.lane);
@@ -199,7 +201,7 @@ impl ImpactPropagation {
                 on.rows[row as usize].delta[..3].fill(0.0);
             }
         }
-        if on.timed && !is_done {
+        if on.timed && on.writes_rows && !is_done {
             self.stay(on);
         }
         is_done
@@ -252,7 +254,9 @@ impl ImpactPropagation {
                     // If the turned point does not bounce, the row of the start would still stop it, so it
                     // bounces on that row.
                     if let Some(then) = rebounds(&turned, on, is_first) {
-                        on.turn(&turned, &frame);
+                        if on.writes_rows {
+                            on.turn(&turned, &frame);
+                        }
                         (*point, target) = (turned, then);
                     }
                 }
@@ -386,7 +390,9 @@ impl ImpactPropagation {
                 turned.turn(frame, on.rows);
                 let Some(then) = arrival(&turned, on, self.slowest) else { return };
                 (*point, time) = (turned, then);
-                on.turn(point, frame);
+                if on.writes_rows {
+                    on.turn(point, frame);
+                }
                 on.fall(point);
             }
             point.time = if time < -on.dt || !on.timed { 0.0 } else { time };

@@ -99,6 +99,8 @@ pub(crate) struct PropagationInput<'a> {
     pub timed: bool,
     /// Bodies with joints, which impacts do not move. `[bodies]`, or empty
     pub joined: &'a [bool],
+    /// Rows take over the frames and arms of impacts.
+    pub writes_rows: bool,
     /// Points that an impact releases bear their load until its time.
     pub releases: bool,
     /// Most visits for each of the first points of an island.

@@ -48,10 +48,9 @@
 //!
 //! Velocities beyond that are scaled down in each substep before bodies move, and at its end.
 
+use super::{CollisionScene, Passes};
 use crate::bodies::{Bodies, BodyKind};
-use crate::constraints::Passes;
 use crate::constraints::kernels::types::ConstraintSet;
-use crate::constraints::step::CollisionScene;
 use crate::contacts::{Contact, ManifoldPoint};
 use crate::disjoint::DisjointSets;
 use crate::narrowphase::Margins;
@@ -69,7 +68,7 @@ type GroupedContact = ([u32; 2], u32, bool);
 
 /// Finds jams; reuses its memory from step to step.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Jams {
+pub(crate) struct Jams {
     /// Deep contacts, by pair of bodies, and the contacts of each body in a squeeze.
     deep: Vec<GroupedContact>,
     /// Bodies that touch a kinematic one, and how fast its surface is there (m/s).

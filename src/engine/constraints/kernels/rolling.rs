@@ -41,13 +41,13 @@ use crate::lanes::{BodyRow, LaneIndex, Lanes, Quad};
 use crate::params::LINEAR_SLOP;
 
 /// Largest change of the gap of a rolling contact (m): a fifth of the slop.
-pub(super) const STEADY: f32 = 0.2 * LINEAR_SLOP;
+pub(crate) const STEADY: f32 = 0.2 * LINEAR_SLOP;
 
 /// Radius above which a shape is a face (m).
 const FLAT: f32 = 1e30;
 
 /// Turns the records of rolling contacts.
-pub(super) struct Roll {
+pub(crate) struct Roll {
     /// τ (s)
     pub middle: f32,
     /// Step (s).
