@@ -39,7 +39,7 @@
 //! rate. Contacts with static bodies have twice the frequency of the others, so the others have at most half of this.
 //! An eighth, as in the source, is 0.79 of √2 in a pile, and 1.57 at a static body, where κ is near 1 and a row is solved in one sweep.
 
-use super::{Uses, Variant};
+use super::{Guarantee, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::impacts::spread::VISITS;
 use crate::constraints::joints::chains::{ChainStage, Chains};
@@ -74,6 +74,10 @@ pub static SOLVER: Variant = Variant {
         Parameter::PUSH_SPEED,
     ],
     mechanisms: &MECHANISMS,
+    exceptions: &[(
+        Guarantee::Converges,
+        "with contacts alone; chains of joints are solved apart from the sweeps",
+    )],
     impacts: ImpactLaw::Solver { per_contact: 0, per_point: 0 },
     frozen: Some(FreezeLimits::LOADED),
     continuous: true,
