@@ -62,4 +62,10 @@ impl<'a> Candidates<'a> {
             (place, candidate, candidate.bodies.map(|body| &self.poses[body as usize]))
         })
     }
+
+    /// Whether a pair has a disc.
+    pub fn has_discs(&self) -> bool {
+        use PairKind::{CircleHull, Circles, HullCircle};
+        [Circles, HullCircle, CircleHull].into_iter().any(|kind| !self.of_kind[kind as usize].is_empty())
+    }
 }

@@ -39,7 +39,6 @@ use crate::constraints::step::jams::Jams;
 use crate::constraints::step::{Collision, CollisionScene};
 use crate::constraints::{ImpactLaw, ImpactWaves, Passes, Solver};
 use crate::lanes::BodyRow;
-use crate::narrowphase::batch::PairKind;
 use crate::narrowphase::circles::Rolling;
 use crate::params::{Budget, Mechanism, Parameter};
 use glam::Vec2;
@@ -184,9 +183,7 @@ impl Solver for Shim {
     }
 
     fn after_collision(&mut self, scene: &mut CollisionScene<'_>) {
-        self.rolls = [PairKind::Circles, PairKind::HullCircle, PairKind::CircleHull]
-            .into_iter()
-            .any(|kind| !scene.candidates.of_kind[kind as usize].is_empty());
+        self.rolls = scene.candidates.has_discs();
         if !scene.without.leaves_out(part::JAMS) {
             let push_speed = scene.parameters[PUSH_SPEED];
             self.jams.release(scene, push_speed);

@@ -48,7 +48,6 @@ use crate::constraints::kernels::velocity::rules::{Bearing, Rigid, Soft, angular
 use crate::constraints::step::jams::Jams;
 use crate::constraints::step::{Collision, CollisionScene};
 use crate::constraints::{ImpactLaw, ImpactWaves, Passes, Solver};
-use crate::narrowphase::batch::PairKind;
 use crate::narrowphase::circles::Rolling;
 use crate::narrowphase::frozen::FreezeLimits;
 use crate::params::{Budget, CONTACT_HERTZ_FRACTION, Mechanism, Parameter};
@@ -140,9 +139,7 @@ impl Solver for SoftBlock {
     }
 
     fn after_collision(&mut self, scene: &mut CollisionScene<'_>) {
-        self.rolls = [PairKind::Circles, PairKind::HullCircle, PairKind::CircleHull]
-            .into_iter()
-            .any(|kind| !scene.candidates.of_kind[kind as usize].is_empty());
+        self.rolls = scene.candidates.has_discs();
         if !scene.without.leaves_out(part::JAMS) {
             let push_speed = scene.parameters[PUSH_SPEED];
             self.jams.release(scene, push_speed);
