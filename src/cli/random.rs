@@ -2,16 +2,12 @@
 
 use super::output::{note, print, print_json, value};
 use super::progress::Bar;
-use super::values::SettingArgs;
 use super::verify::VerifyArgs;
 use crate::engine::solvers::{DEFAULT, Variant, find};
-use crate::engine::world::Settings;
 use crate::lab::error::Error;
 use crate::lab::files;
-use crate::lab::overrides;
 use crate::lab::parallel::{in_parallel, processors};
 use crate::lab::report::environment::Environment;
-use crate::lab::study::budget;
 use crate::lab::torture::families::{FAMILIES, Family};
 use crate::lab::torture::minimize::minimize;
 use crate::lab::torture::table::{lines, text};
@@ -92,44 +88,6 @@ pub struct RandomArgs {
 }
 
 impl VerifyArgs {
-    /// The settings of a solver in every scene. Errors: as [`SettingArgs::settings`].
-    pub fn settings(&self, solver: &'static Variant) -> Result<Settings, Error> {
-        let (work, frozen) = (self.work.clone(), self.frozen);
-        let (impacts, without) = (self.impacts, self.without.clone());
-        let own = SettingArgs { solver, work, impacts, frozen, without };
-        let own = own.settings()?;
-        Ok(Settings { continuous: self.continuous.unwrap_or(own.continuous), ..own })
-    }
-
-    /// Name of a solver in rows, with the options that differ from its defaults.
-    ///
-    /// Errors: those of its settings.
-    fn name(&self, solver: &'static Variant) -> Result<String, Error> {
-        let (mut name, own) = (solver.name.to_string(), self.settings(solver)?);
-        if own.budget != solver.budget {
-            name += &format!(", {}", budget::brief(&own.budget, solver));
-        }
-        let changed = overrides::changed(solver, &own.parameters);
-        if !changed.is_empty() {
-            name += &format!(", {changed}");
-        }
-        if own.frozen != Default::default() {
-            name += &format!(", frozen {}", own.frozen);
-        }
-        match self.continuous {
-            Some(true) if !solver.continuous => name += ", continuous",
-            Some(false) if solver.continuous => name += ", not continuous",
-            _ => {}
-        }
-        if self.impacts.impacts != Default::default() {
-            name += &format!(", impacts {}", self.impacts.impacts.name());
-        }
-        if !self.without.without.is_empty() {
-            name += &format!(", without {}", self.without.without.join(" "));
-        }
-        Ok(name)
-    }
-
     /// The wanted scenes.
     fn scenes(&self) -> Vec<(&'static Family, u32)> {
         match self.random.random {

@@ -3,11 +3,13 @@
 use super::output::{self, finite, print_json, value};
 use super::progress::Bar;
 use super::random::{self, RandomArgs};
-use super::values::{self, BudgetArgs, FrozenArgs, ImpactArgs, Solvers, WithoutArgs};
-use crate::engine::constraints::Impacts;
+use super::values::{self, BudgetArgs, FrozenArgs, ImpactArgs, SettingArgs, Solvers, WithoutArgs};
 use crate::engine::solvers::{DEFAULT, VARIANTS, Variant};
+use crate::engine::world::Settings;
 use crate::lab::ablate;
 use crate::lab::error::Error;
+use crate::lab::overrides;
+use crate::lab::study::budget;
 use crate::lab::units::number;
 use crate::lab::verify::{self, CASES, Case, Cell, Finding, Lab, LawOf, Required, VerifyMatrix};
 use clap::Args;
@@ -72,7 +74,7 @@ pub struct VerifyArgs {
     #[arg(long)]
     pub json: bool,
     /// List the cases with their tolerances and what is required of the default solver, without running them
-    #[arg(long, conflicts_with = random::OPTIONS)]
+    #[arg(long, conflicts_with_all = NOT_LISTED)]
     pub list: bool,
     /// Threads; the results do not depend on them [default: 2; all cores for random scenes, 1 with --pace]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -82,7 +84,65 @@ pub struct VerifyArgs {
     pub random: RandomArgs,
 }
 
+/// Name in rows and settings, by solver.
+type EachSetting = HashMap<&'static str, (String, Settings)>;
+
+/// Options that say how cases run, or that need random scenes: a list depends on none of them.
+const NOT_LISTED: [&str; 8] = [
+    random::OPTIONS,
+    "continuous",
+    "substeps",
+    "velocity_iterations",
+    "relax_iterations",
+    "position_iterations",
+    "set",
+    "frozen",
+];
+
 impl VerifyArgs {
+    /// The settings of a solver in every scene. Errors: as [`SettingArgs::settings`].
+    pub fn settings(&self, solver: &'static Variant) -> Result<Settings, Error> {
+        let (work, frozen) = (self.work.clone(), self.frozen);
+        let (impacts, without) = (self.impacts, self.without.clone());
+        let own = SettingArgs { solver, work, impacts, frozen, without };
+        let own = own.settings()?;
+        Ok(Settings { continuous: self.continuous.unwrap_or(own.continuous), ..own })
+    }
+
+    /// Name of a solver in rows, with the options that differ from its defaults.
+    ///
+    /// Errors: those of its settings.
+    pub fn name(&self, solver: &'static Variant) -> Result<String, Error> {
+        let (mut name, own) = (solver.name.to_string(), self.settings(solver)?);
+        if own.budget != solver.budget {
+            name += &format!(", {}", budget::brief(&own.budget, solver));
+        }
+        let changed = overrides::changed(solver, &own.parameters);
+        if !changed.is_empty() {
+            name += &format!(", {changed}");
+        }
+        if own.frozen != Default::default() {
+            name += &format!(", frozen {}", own.frozen);
+        }
+        match self.continuous {
+            Some(true) if !solver.continuous => name += ", continuous",
+            Some(false) if solver.continuous => name += ", not continuous",
+            _ => {}
+        }
+        if self.impacts.impacts != Default::default() {
+            name += &format!(", impacts {}", self.impacts.impacts.name());
+        }
+        if !self.without.without.is_empty() {
+            name += &format!(", without {}", self.without.without.join(" "));
+        }
+        Ok(name)
+    }
+
+    /// The setting of each solver, by the name of the solver. Errors: as [`Self::settings`].
+    fn each(&self, solvers: &[&'static Variant]) -> Result<EachSetting, Error> {
+        solvers.iter().map(|v| Ok((v.name, (self.name(v)?, self.settings(v)?)))).collect()
+    }
+
     fn threads(&self) -> usize {
         self.threads.unwrap_or(2).into()
     }
@@ -101,23 +161,24 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode, Error> {
         };
     }
     let solvers = args.solvers.chosen();
-    let impacts = args.impacts.impacts;
     if args.without.without == ["all"] {
         return without_each(args, &cases, &solvers);
     }
     let note = values::left_out(&solvers);
     let bar = Bar::new();
     let tell = |done, total, what: &str| bar.show(done, total, what);
-    let settings =
-        solvers.iter().map(|v| Ok((v.name, args.settings(v)?))).collect::<Result<HashMap<_, _>, Error>>()?;
-    let lab = |v: &'static Variant| Lab::with(settings[v.name].clone());
+    let each = args.each(&solvers)?;
+    let lab = |v: &'static Variant| Lab::with(each[v.name].1.clone());
     let matrix = verify::run(cases, solvers, args.threads(), lab, &tell);
     drop(bar);
     if args.json {
-        print_json(&json(&matrix, impacts))?;
+        print_json(&json(&matrix, &each))?;
         return Ok(exit_code(&matrix));
     }
-    print(&(text(&matrix) + &note + &outcomes(&matrix) + &required(&matrix)), exit_code(&matrix))
+    let names = matrix.solvers.iter().map(|v| (v.name, &each[v.name].0));
+    let changed = names.filter(|(solver, name)| name != solver);
+    let changed: String = changed.map(|(_, name)| format!("settings: {name}\n")).collect();
+    print(&(changed + &text(&matrix) + &note + &outcomes(&matrix) + &required(&matrix)), exit_code(&matrix))
 }
 
 /// Leaves out each mechanism of the solvers that have some.
@@ -134,7 +195,9 @@ fn without_each(
     }
     let bar = Bar::new();
     let tell = |done, total, what: &str| bar.show(done, total, what);
-    let lab = |v| Lab::new(v).impacts(args.impacts.impacts);
+    let with_all = VerifyArgs { without: WithoutArgs::default(), ..args.clone() };
+    let each = with_all.each(solvers)?;
+    let lab = |v: &'static Variant| Lab::with(each[v.name].1.clone());
     let rows: Vec<_> =
         solvers.iter().flat_map(|v| ablate::run(v, cases, args.threads(), lab, &tell)).collect();
     drop(bar);
@@ -268,11 +331,12 @@ fn cell_text(cell: &Cell, with_truth: bool) -> String {
     }
 }
 
-fn json(matrix: &VerifyMatrix, impacts: Impacts) -> Value {
+fn json(matrix: &VerifyMatrix, each: &EachSetting) -> Value {
     let cell = |case: &Case, solver: &Variant, cell: &Cell| {
+        let (name, settings) = &each[solver.name];
         let mut value = json!({
-            "case": case.id, "solver": solver.name, "budget": solver.budget,
-            "impacts": impacts.name(), "unit": case.unit,
+            "case": case.id, "solver": solver.name, "settings": name, "budget": settings.budget,
+            "impacts": settings.impacts.name(), "unit": case.unit,
             "required": case.required.is_required() && solver.name == DEFAULT,
             "passed": cell.passed(),
         });
@@ -348,7 +412,8 @@ mod tests {
     fn json_holds_every_cell() {
         let cases = verify::select(&["A0".to_string(), "B2.box".to_string()]).unwrap();
         let matrix = verify::run(cases, VARIANTS.to_vec(), 1, Lab::new, &|_, _, _| ());
-        let value = json(&matrix, Impacts::Own);
+        let setting = |v: &&'static Variant| (v.name, (v.name.to_string(), Settings::new(v)));
+        let value = json(&matrix, &VARIANTS.iter().map(setting).collect());
         assert_eq!(value["results"].as_array().unwrap().len(), 2 * VARIANTS.len());
         assert_eq!(value["broken_promises"], json!([]));
     }

@@ -115,6 +115,8 @@ fn bad_requests_are_refused_in_one_line() {
         ("verify --random dropz:17", &["'dropz'", "'drops'"]),
         ("verify --random 0", &["--random", "'0'", "1000000"]),
         ("verify --keep failed", &["--random"]),
+        ("verify --list --frozen off", &["--list", "--frozen"]),
+        ("verify --list --substeps 4", &["--list", "--substeps"]),
         ("verify --cases A5 --random 5", &["--cases", "--random"]),
         ("verify --list --random 5", &["--list", "--random"]),
         ("verify --cases A5 --pace 3", &["--cases", "--pace"]),

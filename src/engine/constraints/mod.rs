@@ -30,6 +30,5 @@ pub use records::features::{Features, Kernel, KernelFeatures, Layout, PartnerKin
 pub use records::kept;
 pub use records::order::SweepOrder;
 pub use records::point_vector::PointVector;
-pub(crate) use step::ImpactWaves;
 pub use step::{Passes, Schedule, Solver, StepInput, WorkCount, Workspace};
 pub use vectors::system::System;

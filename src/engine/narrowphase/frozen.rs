@@ -235,10 +235,8 @@ impl FrozenContacts {
             return;
         }
         for ((found, last), kind) in self.found.iter_mut().zip(&mut self.last_found).zip(KINDS) {
-            let touching_pairs =
-                || candidates.of(kind).filter(|(_, candidate, _)| candidate.contact != NO_CONTACT);
-            let is_same =
-                touching_pairs().map(|(_, candidate, _)| candidate.pair()).eq(found.iter().map(|f| f.pair));
+            let pairs = with_contact(candidates, kind).map(|(_, candidate, _)| candidate.pair());
+            let is_same = pairs.eq(found.iter().map(|f| f.pair));
             if !is_same {
                 std::mem::swap(found, last);
                 found.clear();
@@ -249,7 +247,7 @@ impl FrozenContacts {
                 }));
                 continue;
             }
-            for ((place, candidate, bodies), found) in touching_pairs().zip(found) {
+            for ((place, candidate, bodies), found) in with_contact(candidates, kind).zip(found) {
                 if !self.keep[place as usize] {
                     let contact = &mut contacts[candidate.contact as usize];
                     *found = FrozenManifold::new(candidate.pair(), contact, bodies);
@@ -259,16 +257,22 @@ impl FrozenContacts {
     }
 }
 
-/// The candidates of a kind that have a contact: index, candidate, poses, and the entry of the pair in `found`, which
-/// is sorted by pair.
+/// The candidates of a kind that have a contact: index, candidate and poses.
+fn with_contact(
+    candidates: Candidates<'_>,
+    kind: PairKind,
+) -> impl Iterator<Item = (u32, &Candidate, [&PoseRow; 2])> {
+    candidates.of(kind).filter(|(_, candidate, _)| candidate.contact != NO_CONTACT)
+}
+
+/// As [`with_contact`], with the entry of the pair in `found`, which is sorted by pair.
 fn touching<'a>(
     candidates: Candidates<'a>,
     kind: PairKind,
     found: &'a [FrozenManifold],
 ) -> impl Iterator<Item = (usize, &'a Candidate, [&'a PoseRow; 2], Option<&'a FrozenManifold>)> {
     let mut found = found.iter().peekable();
-    let with_contact = candidates.of(kind).filter(|(_, candidate, _)| candidate.contact != NO_CONTACT);
-    with_contact.map(move |(place, candidate, bodies)| {
+    with_contact(candidates, kind).map(move |(place, candidate, bodies)| {
         let pair = candidate.pair();
         while found.next_if(|f| f.pair < pair).is_some() {}
         (place as usize, candidate, bodies, found.next_if(|f| f.pair == pair))

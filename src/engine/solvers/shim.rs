@@ -30,16 +30,12 @@ mod rest;
 
 use super::{Guarantee, Uses, Variant};
 use crate::clock::Phase;
-use crate::constraints::impacts::spread::VISITS;
-use crate::constraints::joints::chains::{ChainStage, Chains};
-use crate::constraints::kernels::rolling::{Roll, STEADY};
 use crate::constraints::kernels::velocity::rules::{Bearing, Between, Relaxed, Rigid, Soft};
 use crate::constraints::records::kept::StateSize;
-use crate::constraints::step::jams::Jams;
+use crate::constraints::step::block_substeps::BlockSubsteps;
 use crate::constraints::step::{Collision, CollisionScene};
-use crate::constraints::{ImpactLaw, ImpactWaves, Passes, Solver};
+use crate::constraints::{ImpactLaw, Passes, Solver};
 use crate::lanes::BodyRow;
-use crate::narrowphase::circles::Rolling;
 use crate::params::{Budget, Mechanism, Parameter};
 use glam::Vec2;
 use rest::hand_down::PropagateLoads;
@@ -152,55 +148,35 @@ const MECHANISMS: [Mechanism; 12] = [
 #[derive(Clone, Debug, Default)]
 struct Shim {
     hand_down: PropagateLoads,
-    jams: Jams,
-    chains: Chains,
-    /// Whether a dynamic body has a joint; empty without joints. `[bodies]`
-    joined: Vec<bool>,
-    /// `joined` of the last step. `[bodies]`
-    last_joined: Vec<bool>,
+    substeps: BlockSubsteps,
     /// Changes of velocity per substep under the loads of statics. `[rows]`
     fields: Vec<BodyRow>,
     /// Gravity of the last step (m/s²).
     gravity: Vec2,
     /// Number of bodies that have taken a step. They have the lowest indices.
     stepped: usize,
-    /// Whether a candidate pair has a round shape.
-    rolls: bool,
-}
-
-/// Visit limit for each of the first points of an island that is hit. With it, no step takes four times as
-/// long as others. The work of a step outside its substeps takes as long as eight substeps.
-fn visits(substeps: u32) -> usize {
-    let standard = SOLVER.budget.substeps;
-    VISITS * (substeps.min(standard) + 8) as usize / (standard + 8) as usize
 }
 
 impl Solver for Shim {
     fn before_collision(&mut self, scene: &mut CollisionScene<'_>, collision: &mut Collision) {
         if !scene.without.leaves_out(part::FRAMES) {
-            collision.rolling = Some(Rolling { limit: STEADY * scene.length_unit });
+            collision.rolling = Some(BlockSubsteps::rolling(scene));
         }
     }
 
     fn after_collision(&mut self, scene: &mut CollisionScene<'_>) {
-        self.rolls = scene.candidates.has_discs();
-        if !scene.without.leaves_out(part::JAMS) {
-            let push_speed = scene.parameters[PUSH_SPEED];
-            self.jams.release(scene, push_speed);
-        } else {
-            self.jams.clear();
-        }
+        let push_speed = (!scene.without.leaves_out(part::JAMS)).then(|| scene.parameters[PUSH_SPEED]);
+        let joints_changed = self.substeps.after_collision(scene, push_speed);
         self.place(scene);
-        let joints_changed = self.find_joined(scene);
         let changed = scene.contacts_changed || joints_changed || scene.gravity != self.gravity;
         if changed || self.hand_down.is_stale(scene.contacts, scene.gravity) {
             self.gravity = scene.gravity;
-            self.hand_down.build(scene.bodies, &self.joined, scene.contacts, scene.gravity);
+            self.hand_down.build(scene.bodies, self.substeps.joined(), scene.contacts, scene.gravity);
         }
     }
 
     fn step(&mut self, passes: &mut Passes<'_>) {
-        let (budget, h, dt) = (passes.budget(), passes.h(), passes.dt());
+        let h = passes.h();
         let [stiffness, damping_ratio, push_speed, load_sweeps] = [0, 1, 2, 3].map(|i| passes.parameter(i));
         let omega = TAU * stiffness / h;
         let [damping, relaxation] =
@@ -211,64 +187,25 @@ impl Solver for Shim {
         let rigid = Rigid::new(h);
         let soft = Between { equal: Bearing { springs, from }, unequal: Bearing { springs: damped, from } };
         let relaxed = Between { equal: rigid, unequal: Relaxed { rule: rigid, factor: relaxation } };
-        if self.rolls && passes.has(part::FRAMES) {
-            let middle = 0.5 * (1.0 - 1.0 / budget.substeps as f32) * dt;
-            passes.run(Phase::Prepare, &mut Roll { middle, dt, steady: STEADY * passes.length_unit() });
+        if passes.has(part::FRAMES) {
+            self.substeps.roll(passes);
         }
-        self.impacts(passes);
+        if passes.has(part::IMPACTS) {
+            let (timed, writes_rows) = (passes.has(part::MOMENT), true);
+            let releases = passes.has(part::RELEASE);
+            self.substeps.impacts(passes, timed, writes_rows, releases);
+        }
         if passes.has(part::STATICS) {
             self.rest(passes, springs, load_sweeps as u32);
             passes.parts().clock.lap(Phase::Prepare);
         }
-        if passes.has(part::CHAINS) {
-            passes.find_chains(&mut self.chains);
-        } else {
-            self.chains = Chains::default();
-        }
-        for substep in 0..budget.substeps {
-            if substep == 0 || self.chains.has_effective_mass_scaling() {
-                passes.integrate_velocities();
-                passes.snapshot_chains(&mut self.chains);
-                passes.warm_start();
-            } else {
-                passes.integrate_and_warm_start();
-            }
-            passes.solve_chains(&mut self.chains, ChainStage::Begin);
-            for _ in 0..budget.velocity_iterations {
-                passes.block_sweep_normal_first(Phase::Solve, soft);
-                passes.iteration_done();
-            }
-            passes.solve_chains(&mut self.chains, ChainStage::Again);
-            self.jams.bound(passes);
-            passes.integrate_positions();
-            for _ in 0..budget.relax_iterations {
-                passes.block_sweep_normal_first(Phase::Relax, relaxed);
-            }
-            passes.solve_chains(&mut self.chains, ChainStage::Relax);
-            passes.keep_chains(&self.chains, substep + 1 == budget.substeps);
-            self.jams.bound(passes);
-            passes.end_substep(substep);
-        }
-        passes.leave_chains(&mut self.chains);
+        let chains = passes.has(part::CHAINS);
+        self.substeps.run(passes, soft, relaxed, chains);
         self.stepped = passes.parts().work.rows.len() - 1;
     }
 }
 
 impl Shim {
-    /// Finds which dynamic bodies have joints. Returns whether this has changed since the last step.
-    fn find_joined(&mut self, scene: &CollisionScene<'_>) -> bool {
-        if scene.types.is_empty() && self.joined.is_empty() {
-            return false;
-        }
-        std::mem::swap(&mut self.joined, &mut self.last_joined);
-        self.joined.clear();
-        self.joined.resize(if scene.types.is_empty() { 0 } else { scene.bodies.len() }, false);
-        for &body in scene.types.iter().flat_map(|joined| joined.kind.ends()).flatten() {
-            self.joined[body as usize] = scene.bodies.is_dynamic(body as usize);
-        }
-        self.joined != self.last_joined
-    }
-
     /// Lets contacts found in the first step of one of their bodies bear all of their load at once.
     fn place(&self, scene: &mut CollisionScene<'_>) {
         if self.stepped >= scene.bodies.len() {
@@ -281,20 +218,6 @@ impl Shim {
                 kept[REST_TIME] = 1.0;
                 kept[PRELOAD..].fill(-1.0);
             }
-        }
-    }
-
-    /// Solves impacts before the step.
-    fn impacts(&mut self, passes: &mut Passes<'_>) {
-        if passes.impacts() == SOLVER.impacts && passes.has(part::IMPACTS) {
-            passes.spread_impacts(ImpactWaves {
-                timed: passes.has(part::MOMENT),
-                inelastic_except: Some(&self.joined),
-                writes_rows: true,
-                releases: passes.has(part::RELEASE),
-                visits: visits(passes.budget().substeps),
-            });
-            passes.parts().clock.lap(Phase::Prepare);
         }
     }
 }

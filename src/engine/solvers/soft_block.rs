@@ -40,15 +40,10 @@
 //! An eighth, as in the source, is 0.79 of √2 in a pile, and 1.57 at a static body, where κ is near 1 and a row is solved in one sweep.
 
 use super::{Guarantee, Uses, Variant};
-use crate::clock::Phase;
-use crate::constraints::impacts::spread::VISITS;
-use crate::constraints::joints::chains::{ChainStage, Chains};
-use crate::constraints::kernels::rolling::{Roll, STEADY};
 use crate::constraints::kernels::velocity::rules::{Bearing, Rigid, Soft, angular_frequencies};
-use crate::constraints::step::jams::Jams;
+use crate::constraints::step::block_substeps::BlockSubsteps;
 use crate::constraints::step::{Collision, CollisionScene};
-use crate::constraints::{ImpactLaw, ImpactWaves, Passes, Solver};
-use crate::narrowphase::circles::Rolling;
+use crate::constraints::{ImpactLaw, Passes, Solver};
 use crate::narrowphase::frozen::FreezeLimits;
 use crate::params::{Budget, CONTACT_HERTZ_FRACTION, Mechanism, Parameter};
 
@@ -116,101 +111,34 @@ const MECHANISMS: [Mechanism; 5] = [
 /// State kept between steps.
 #[derive(Clone, Debug, Default)]
 struct SoftBlock {
-    jams: Jams,
-    chains: Chains,
-    /// Whether a dynamic body has a joint; empty without joints. `[bodies]`
-    joined: Vec<bool>,
-    /// Whether a candidate pair has a round shape.
-    rolls: bool,
-}
-
-/// Visit limit for each of the first points of an island that is hit. With it, no step takes four times as
-/// long as others. The work of a step outside its substeps takes as long as eight substeps.
-fn visits(substeps: u32) -> usize {
-    let standard = SOLVER.budget.substeps;
-    VISITS * (substeps.min(standard) + 8) as usize / (standard + 8) as usize
+    substeps: BlockSubsteps,
 }
 
 impl Solver for SoftBlock {
     fn before_collision(&mut self, scene: &mut CollisionScene<'_>, collision: &mut Collision) {
         if !scene.without.leaves_out(part::FRAMES) {
-            collision.rolling = Some(Rolling { limit: STEADY * scene.length_unit });
+            collision.rolling = Some(BlockSubsteps::rolling(scene));
         }
     }
 
     fn after_collision(&mut self, scene: &mut CollisionScene<'_>) {
-        self.rolls = scene.candidates.has_discs();
-        if !scene.without.leaves_out(part::JAMS) {
-            let push_speed = scene.parameters[PUSH_SPEED];
-            self.jams.release(scene, push_speed);
-        } else {
-            self.jams.clear();
-        }
-        self.joined.clear();
-        if !scene.types.is_empty() {
-            self.joined.resize(scene.bodies.len(), false);
-        }
-        for &body in scene.types.iter().flat_map(|joined| joined.kind.ends()).flatten() {
-            self.joined[body as usize] = scene.bodies.is_dynamic(body as usize);
-        }
+        let push_speed = (!scene.without.leaves_out(part::JAMS)).then(|| scene.parameters[PUSH_SPEED]);
+        self.substeps.after_collision(scene, push_speed);
     }
 
     fn step(&mut self, passes: &mut Passes<'_>) {
-        let (budget, h, dt) = (passes.budget(), passes.h(), passes.dt());
         let [stiffness, damping_ratio, push_speed] = [0, 1, 2].map(|i| passes.parameter(i));
-        let springs =
-            Soft::new(angular_frequencies(f32::INFINITY, stiffness, h), damping_ratio, push_speed, h);
-        let (soft, rigid) = (Bearing { springs, from: push_speed }, Rigid::new(h));
-        if self.rolls && passes.has(part::FRAMES) {
-            let middle = 0.5 * (1.0 - 1.0 / budget.substeps as f32) * dt;
-            passes.run(Phase::Prepare, &mut Roll { middle, dt, steady: STEADY * passes.length_unit() });
+        let frequencies = angular_frequencies(f32::INFINITY, stiffness, passes.h());
+        let springs = Soft::new(frequencies, damping_ratio, push_speed, passes.h());
+        let (soft, rigid) = (Bearing { springs, from: push_speed }, Rigid::new(passes.h()));
+        if passes.has(part::FRAMES) {
+            self.substeps.roll(passes);
         }
-        self.impacts(passes);
-        if passes.has(part::CHAINS) {
-            passes.find_chains(&mut self.chains);
-        } else {
-            self.chains = Chains::default();
+        if passes.has(part::IMPACTS) {
+            let (timed, writes_rows, releases) = (passes.has(part::MOMENT), false, false);
+            self.substeps.impacts(passes, timed, writes_rows, releases);
         }
-        for substep in 0..budget.substeps {
-            if substep == 0 || self.chains.has_effective_mass_scaling() {
-                passes.integrate_velocities();
-                passes.snapshot_chains(&mut self.chains);
-                passes.warm_start();
-            } else {
-                passes.integrate_and_warm_start();
-            }
-            passes.solve_chains(&mut self.chains, ChainStage::Begin);
-            for _ in 0..budget.velocity_iterations {
-                passes.block_sweep_normal_first(Phase::Solve, soft);
-                passes.iteration_done();
-            }
-            passes.solve_chains(&mut self.chains, ChainStage::Again);
-            self.jams.bound(passes);
-            passes.integrate_positions();
-            for _ in 0..budget.relax_iterations {
-                passes.block_sweep_normal_first(Phase::Relax, rigid);
-            }
-            passes.solve_chains(&mut self.chains, ChainStage::Relax);
-            passes.keep_chains(&self.chains, substep + 1 == budget.substeps);
-            self.jams.bound(passes);
-            passes.end_substep(substep);
-        }
-        passes.leave_chains(&mut self.chains);
-    }
-}
-
-impl SoftBlock {
-    /// Solves impacts before the step.
-    fn impacts(&mut self, passes: &mut Passes<'_>) {
-        if passes.impacts() == SOLVER.impacts && passes.has(part::IMPACTS) {
-            passes.spread_impacts(ImpactWaves {
-                timed: passes.has(part::MOMENT),
-                inelastic_except: Some(&self.joined),
-                writes_rows: false,
-                releases: false,
-                visits: visits(passes.budget().substeps),
-            });
-            passes.parts().clock.lap(Phase::Prepare);
-        }
+        let chains = passes.has(part::CHAINS);
+        self.substeps.run(passes, soft, rigid, chains);
     }
 }

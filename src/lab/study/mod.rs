@@ -373,8 +373,9 @@ fn time(
     }
     for i in 0..runs.len() {
         let own = &runs[i].record;
-        let key = |r: &Record| (r.solver, r.budget, r.impacts, r.frozen, r.swept, r.parameters.clone());
-        let one_lane = |r: &&Record| r.order == Order::Colored && r.lanes == 1 && key(r) == key(own);
+        let key = |r: &Record| (r.solver, r.budget, r.impacts, r.frozen, r.swept);
+        let is_own = |r: &Record| key(r) == key(own) && r.parameters == own.parameters;
+        let one_lane = |r: &&Record| r.order == Order::Colored && r.lanes == 1 && is_own(r);
         let slow = runs.iter().map(|run| &run.record).find(one_lane).and_then(|r| r.sample.as_ref());
         let ratio = slow.zip(own.sample.as_ref()).and_then(|(slow, own)| Ratio::of(slow, own));
         runs[i].record.speed_up = ratio.map(|r| r.median);

@@ -5,10 +5,11 @@
 
 #[doc(hidden)]
 pub mod assign;
+pub(crate) mod block_substeps;
 mod bodies;
 mod drifts;
 mod impacts;
-pub(crate) mod jams;
+mod jams;
 mod solver;
 mod sweeps;
 mod vectors;

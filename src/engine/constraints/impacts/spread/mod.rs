@@ -149,11 +149,9 @@ impl ImpactPropagation {
             begin = end;
         }
         for point in self.points.iter().filter(|point| point.given != [0.0; 2]) {
-            if on.writes_rows {
-                on.put(point);
-                if point.role == Role::Left {
-                    on.leave(point);
-                }
+            on.put(point);
+            if point.role == Role::Left {
+                on.leave(point);
             }
             if on.record_impulses {
                 let contact = on.contact_of(point.lane);
@@ -254,9 +252,7 @@ impl ImpactPropagation {
                     // If the turned point does not bounce, the row of the start would still stop it, so it
                     // bounces on that row.
                     if let Some(then) = rebounds(&turned, on, is_first) {
-                        if on.writes_rows {
-                            on.turn(&turned, &frame);
-                        }
+                        on.turn(&turned, &frame);
                         (*point, target) = (turned, then);
                     }
                 }
@@ -390,9 +386,7 @@ impl ImpactPropagation {
                 turned.turn(frame, on.rows);
                 let Some(then) = arrival(&turned, on, self.slowest) else { return };
                 (*point, time) = (turned, then);
-                if on.writes_rows {
-                    on.turn(point, frame);
-                }
+                on.turn(point, frame);
                 on.fall(point);
             }
             point.time = if time < -on.dt || !on.timed { 0.0 } else { time };

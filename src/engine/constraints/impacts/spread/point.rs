@@ -99,7 +99,7 @@ pub(crate) struct PropagationInput<'a> {
     pub timed: bool,
     /// Bodies with joints, which impacts do not move. `[bodies]`, or empty
     pub joined: &'a [bool],
-    /// Rows take over the frames and arms of impacts.
+    /// Rows take over the frames and arms of impacts; else [`Self::turn`], [`Self::put`] and [`Self::leave`] do nothing.
     pub writes_rows: bool,
     /// Points that an impact releases bear their load until its time.
     pub releases: bool,
@@ -153,6 +153,9 @@ impl PropagationInput<'_> {
 
     /// Writes the frame of the time of touch to the record of a point.
     pub(super) fn turn(&mut self, point: &HitPoint, frame: &TouchFrame) {
+        if !self.writes_rows {
+            return;
+        }
         let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
         let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
         let rows = point.rows.map(|row| &self.rows[row as usize]);
@@ -161,6 +164,9 @@ impl PropagationInput<'_> {
 
     /// Writes the arms of the impact to the record, for the rest of the step.
     pub(super) fn put(&mut self, point: &HitPoint) {
+        if !self.writes_rows {
+            return;
+        }
         let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
         let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
         let put = |vector: usize, value: f32| floats[first + vector * width] = value;
@@ -169,6 +175,9 @@ impl PropagationInput<'_> {
 
     /// Removes the overlap of a point that has bounced from its record: it separates without a push.
     pub(super) fn leave(&mut self, point: &HitPoint) {
+        if !self.writes_rows {
+            return;
+        }
         let raised = point.gap(self.rows).min(0.0);
         let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
         let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());

@@ -74,7 +74,7 @@ impl Shim {
             velocity: [gained[0], gained[1], gained[2], row.velocity[3]],
             delta: [0.0, 0.0, 0.0, row.delta[3]],
         }));
-        for (field, _) in fields.iter_mut().zip(&self.joined).filter(|(_, joined)| **joined) {
+        for (field, _) in fields.iter_mut().zip(self.substeps.joined()).filter(|(_, joined)| **joined) {
             field.delta[JOINED - 4] = 1.0;
         }
         passes.over_contacts(&mut closed::Close { fields, h, dt, length_unit });
