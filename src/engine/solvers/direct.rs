@@ -39,21 +39,19 @@
 //! For fixed states the law is linear, u = K λ + b. A step moves toward the solution of these states, as far
 //! as the residual of the natural map falls.
 
-mod law;
-
 use super::{Guarantee, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::kernels::velocity::rules::NormalRule;
-use crate::constraints::numerics::block_lu::BlockLu;
 use crate::constraints::numerics::cone;
 use crate::constraints::vectors::blocks::JointBlocks;
+use crate::constraints::vectors::law::IslandLaw;
+use crate::constraints::vectors::newton::Island;
 use crate::constraints::vectors::system::{Pair, PointRows};
 use crate::constraints::{Passes, PointVector, Schedule, System};
 use crate::disjoint::DisjointSets;
 use crate::lanes::BodyRow;
 use crate::params::{Budget, Parameter};
-use law::IslandLaw;
 
 /// See the [module](self).
 pub static SOLVER: Variant = Variant {
@@ -96,23 +94,6 @@ pub static SOLVER: Variant = Variant {
     ..Variant::BASE
 };
 
-/// ε: shift added to the unit diagonal (1).
-const SHIFT: f64 = 1e-7;
-/// Most pivots of Lemke's method per unknown.
-const PIVOTS: usize = 10;
-/// Solves of a linear problem: one, and two refinements on the residual.
-const PASSES: usize = 3;
-/// Most halvings of a Newton step.
-const HALVINGS: usize = 8;
-/// Sweeps in `f64` that replace a Newton step without improvement.
-const SWEEPS: usize = 8;
-/// Steps that leave more than half of the merit, after which Lemke's method is tried.
-const PATIENCE: usize = 9;
-/// Most points of an island for that.
-const PIVOTED: usize = 64;
-/// Residual, relative to the largest impulse, at which the law is solved.
-const TOLERANCE: f64 = 1e-10;
-
 fn step(passes: &mut Passes<'_>) {
     let (budget, h) = (passes.budget(), passes.h());
     let rule = Baumgarte::new(passes.parameter(0), passes.slop(), passes.push_speed(), h);
@@ -152,10 +133,17 @@ fn step(passes: &mut Passes<'_>) {
 
 /// State of Newton's method, island by island.
 struct Newton {
-    islands: Vec<Island>,
+    /// Each with its joint blocks.
+    islands: Vec<(Island, Vec<usize>)>,
+    rows: Rows,
+}
+
+/// The rows of all islands.
+struct Rows {
     /// Impulses in the records, and gap and friction of each point.
     written: Vec<Pair>,
     surfaces: Vec<Pair>,
+    /// Changes of impulses that velocities have yet to follow.
     delta: Vec<Pair>,
     joints: JointBlocks,
 }
@@ -186,29 +174,30 @@ impl Newton {
             for &block in &blocks {
                 law.join(system.rows(), &joints.blocks[block], rule.of_errors().bias_rate, h);
             }
-            Island::new(law, blocks)
+            (Island::new(law), blocks)
         });
         let islands = islands.collect();
         let delta = vec![[0.0; 2]; written.len()];
-        Newton { islands, written, surfaces, delta, joints }
+        Newton { islands, rows: Rows { written, surfaces, delta, joints } }
     }
 
     /// Takes one step in every island, and updates records and velocities.
     fn step(&mut self, system: &mut System<'_>, by_pivots: bool) {
         let mut found = false;
-        for island in &mut self.islands {
+        let Newton { islands, rows } = self;
+        for (island, blocks) in islands {
             let better = if by_pivots { island.pivot(usize::MAX) } else { island.step() };
             if better {
-                island.write(system, &mut self.written, &mut self.delta, &self.surfaces, &mut self.joints);
+                rows.write(island, blocks, system);
                 found = true;
             }
         }
         if found {
-            system.set_impulses(&self.written);
-            system.apply(&self.delta);
-            self.delta.fill([0.0; 2]);
-            if !self.joints.blocks.is_empty() {
-                system.set_joint_impulses(&self.joints);
+            system.set_impulses(&rows.written);
+            system.apply(&rows.delta);
+            rows.delta.fill([0.0; 2]);
+            if !rows.joints.blocks.is_empty() {
+                system.set_joint_impulses(&rows.joints);
             }
         }
     }
@@ -239,120 +228,22 @@ fn parts(bodies: &[BodyRow], points: Vec<PointRows>, joints: &JointBlocks) -> Ve
     parts.into_values().collect()
 }
 
-/// The impulses of an island, and their merit.
-struct Island {
-    law: IslandLaw,
-    /// Its joint blocks.
-    blocks: Vec<usize>,
-    /// Factors of the bodies' matrix, in its order.
-    factors: BlockLu<3>,
-    impulses: Vec<f64>,
-    arguments: Vec<f64>,
-    merit: f64,
-    /// No improvement was found.
-    done: bool,
-    /// Steps that left more than half of the merit.
-    stalls: usize,
-    /// Whether Lemke's method was tried.
-    pivoted: bool,
-}
-
-impl Island {
-    fn new(mut law: IslandLaw, blocks: Vec<usize>) -> Self {
-        law.couple();
-        let mut factors = BlockLu::default();
-        factors.begin(law.movable, |body| law.couplings.of(body));
-        let impulses = law.start.clone();
-        let arguments = law.arguments(&impulses);
-        let merit = law.merit(&impulses, &arguments);
-        Island { law, blocks, factors, impulses, arguments, merit, done: false, stalls: 0, pivoted: false }
-    }
-
-    /// Accepts these impulses if their merit is below `part` times the current merit.
-    fn take(&mut self, impulses: Vec<f64>, part: f64) -> bool {
-        let arguments = self.law.arguments(&impulses);
-        let merit = self.law.merit(&impulses, &arguments);
-        // False if the merit is NaN.
-        let better = merit < part * self.merit;
-        if better {
-            (self.impulses, self.arguments, self.merit) = (impulses, arguments, merit);
-        }
-        better
-    }
-
-    /// One step that reduces the residual, if there is one: Newton's, or sweeps, or Lemke's method in small
-    /// islands. Returns whether it improved.
-    fn step(&mut self) -> bool {
-        self.done |= self.merit <= self.law.goal(&self.impulses);
-        if self.done {
-            return false;
-        }
-        let before = self.merit;
-        let found = (self.stalls >= PATIENCE && self.pivot(PIVOTED)) || self.search() || self.sweep();
-        self.stalls += usize::from(self.merit > 0.5 * before);
-        self.done |= !found;
-        found
-    }
-
-    /// A Newton step, halved until the residual falls.
-    fn search(&mut self) -> bool {
-        let states = self.law.states(&self.arguments);
-        let Some(target) = self.law.solve_states(&states, &mut self.factors) else { return false };
-        let mut fraction = 1.0;
-        (0..HALVINGS).any(|_| {
-            let blend = |(l, t): (&f64, &f64)| l + fraction * (t - l);
-            let trial = self.impulses.iter().zip(&target).map(blend).collect();
-            // The directional derivative of the merit along a Newton step is −2 merit.
-            let found = self.take(trial, 1.0 - 2e-4 * fraction);
-            fraction *= 0.5;
-            found
-        })
-    }
-
-    /// More sweeps, accepted if they improve the merit: then the states change.
-    fn sweep(&mut self) -> bool {
-        let mut impulses = self.impulses.clone();
-        (0..SWEEPS).for_each(|_| self.law.sweep(&mut impulses));
-        self.take(impulses, 1.0)
-    }
-
-    /// Tries Lemke's method once, if the island has at most `points` points. Accepts its solution if it
-    /// improves the merit.
-    fn pivot(&mut self, points: usize) -> bool {
-        if std::mem::replace(&mut self.pivoted, true) || self.law.points.len() > points {
-            return false;
-        }
-        self.law.by_lemke().is_some_and(|found| self.take(found, 1.0))
-    }
-
-    /// Writes the impulses to the records, and updates velocities for those of joints.
-    fn write(
-        &self,
-        system: &mut System<'_>,
-        written: &mut [Pair],
-        delta: &mut [Pair],
-        surfaces: &[Pair],
-        joints: &mut JointBlocks,
-    ) {
-        let points = &self.law.points;
+impl Rows {
+    /// Takes over the impulses of an island, and updates velocities for those of its joints.
+    fn write(&mut self, island: &Island, blocks: &[usize], system: &mut System<'_>) {
+        let points = &island.law.points;
         for (i, point) in points.iter().enumerate() {
-            let (at, normal) = (point.at, self.impulses[2 * i].max(0.0) as f32);
-            let tangent = self.impulses[2 * i + 1] as f32;
-            let new = [normal, cone::friction(tangent, surfaces[at][1] * normal)];
-            delta[at] = [0, 1].map(|axis| new[axis] - written[at][axis]);
-            written[at] = new;
+            let (at, normal) = (point.at, island.impulses[2 * i].max(0.0) as f32);
+            let tangent = island.impulses[2 * i + 1] as f32;
+            let new = [normal, cone::friction(tangent, self.surfaces[at][1] * normal)];
+            self.delta[at] = [0, 1].map(|axis| new[axis] - self.written[at][axis]);
+            self.written[at] = new;
         }
-        let mut new = self.impulses.iter().zip(&self.law.rows).skip(2 * points.len());
-        for &block in &self.blocks {
-            let block = &mut joints.blocks[block];
-            for (r, (&impulse, row)) in (0..block.size).zip(&mut new) {
-                let change = impulse as f32 - std::mem::replace(&mut block.impulses[r], impulse as f32);
-                for (body, j) in row.bodies.into_iter().zip(row.jacobian) {
-                    let Some(on) = system.rows().get_mut(body as usize) else { continue };
-                    let roots = [on.velocity[3], on.velocity[3], on.delta[3]].map(f32::sqrt);
-                    (0..3).for_each(|c| on.velocity[c] += roots[c] * j[c] as f32 * change);
-                }
-            }
+        let mut first = 2 * points.len();
+        for &block in blocks {
+            let block = &mut self.joints.blocks[block];
+            island.push(first..first + block.size, &mut block.impulses, system.rows());
+            first += block.size;
         }
     }
 }

@@ -78,7 +78,7 @@ impl BlockSubsteps {
         if matches!(passes.impacts(), ImpactLaw::Solver { .. }) {
             passes.spread_impacts(ImpactWaves {
                 timed,
-                inelastic_except: Some(&self.joined),
+                stops: true,
                 writes_rows,
                 releases,
                 visits: visits(passes.budget().substeps),

@@ -13,12 +13,11 @@ use crate::params::RESTITUTION_THRESHOLD;
 
 /// How impacts spread; see [`spread`].
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ImpactWaves<'a> {
+pub(crate) struct ImpactWaves {
     /// Whether bodies bounce at the time of their impact instead of the beginning of the step.
     pub timed: bool,
-    /// If set, points that do not bounce are stopped, except those of these bodies, which also stay where
-    /// they are (`[bodies]`, or empty). If `None`, nothing is stopped.
-    pub inelastic_except: Option<&'a [bool]>,
+    /// Whether points that do not bounce are stopped.
+    pub stops: bool,
     /// Whether rows take over the frames and arms of impacts, and lose the overlap of points that have bounced. If not,
     /// impacts write bodies and nothing else.
     pub writes_rows: bool,
@@ -30,8 +29,8 @@ pub(crate) struct ImpactWaves<'a> {
 
 impl Passes<'_> {
     /// Lets approaching points bounce or stop, before the step.
-    pub(crate) fn spread_impacts(&mut self, spreading: ImpactWaves<'_>) {
-        let ImpactWaves { timed, inelastic_except, writes_rows, releases, visits } = spreading;
+    pub(crate) fn spread_impacts(&mut self, spreading: ImpactWaves) {
+        let ImpactWaves { timed, stops, writes_rows, releases, visits } = spreading;
         let (h, dt, slop) = (self.h(), self.dt(), self.slop());
         let bounces = self.law() != ImpactLaw::None;
         if self.contacts.is_empty() {
@@ -45,9 +44,9 @@ impl Passes<'_> {
         let mut spread = std::mem::take(&mut self.work.impacts.spread);
         for (part, found) in [Part::Lanes, Part::Serial].into_iter().zip(spread.found()) {
             found.clear();
-            self.over_part(part, &mut Find { h, dt, least_gain, fastest, bounces, inelastic_except, found });
+            self.over_part(part, &mut Find { h, dt, least_gain, fastest, bounces, stops, found });
         }
-        let Workspace { rows, lanes, serial, motion, .. } = &mut *self.work;
+        let Workspace { rows, lanes, serial, motion, types, poses, .. } = &mut *self.work;
         let done = spread.run(&mut PropagationInput {
             rows,
             batches: [lanes, serial],
@@ -58,7 +57,8 @@ impl Passes<'_> {
             h,
             slop,
             timed,
-            joined: inelastic_except.unwrap_or_default(),
+            types,
+            poses,
             writes_rows,
             releases,
             visits,
@@ -87,7 +87,7 @@ impl Passes<'_> {
             ImpactLaw::Waves => {
                 self.spread_impacts(ImpactWaves {
                     timed: false,
-                    inelastic_except: None,
+                    stops: false,
                     writes_rows: true,
                     releases: true,
                     visits: VISITS,

@@ -3,6 +3,8 @@
 pub mod blocks;
 pub mod body_matrix;
 pub mod conjugate;
+pub(crate) mod law;
+pub(crate) mod newton;
 pub(crate) mod passes;
 pub mod spectral;
 pub mod system;

@@ -5,8 +5,7 @@
 //! |n·a_b|), and than a hundredth of dt |a_b|, and leave faster than a tenth of that. A point that only stops
 //! has to approach at twice the speed: 2 dt (|a_a| + |a_b|) between two bodies that others may push in any
 //! direction, and 2 dt |n·a_b| against a body that nothing pushes, so that a wall that starts to move is
-//! detected. Bodies with joints are not stopped: impacts ignore joints, which would pull the bodies on, step
-//! by step if a limb is caught in another.
+//! detected.
 
 use super::{AHEAD, BOUNCES};
 use crate::constraints::kernels::pass::{Pass, PassInput};
@@ -27,8 +26,8 @@ pub(crate) struct Find<'a> {
     pub fastest: f32,
     /// Whether contacts may bounce.
     pub bounces: bool,
-    /// If non-bouncing points are stopped: marks the bodies that are exempt. `[bodies]`, or empty
-    pub inelastic_except: Option<&'a [bool]>,
+    /// Whether points that do not bounce are stopped.
+    pub stops: bool,
     /// Lanes of the contacts that are hit, in order.
     pub found: &'a mut Vec<u32>,
 }
@@ -57,7 +56,7 @@ fn find<L: Lanes>(
     layout: &Layout,
     contacts: &[Contact],
     increments: &[[f32; 4]],
-    &mut Find { h, dt, least_gain, fastest, bounces, inelastic_except, ref mut found }: &mut Find<'_>,
+    &mut Find { h, dt, least_gain, fastest, bounces, stops, ref mut found }: &mut Find<'_>,
 ) {
     let between_dynamic = segment.pushes_a();
     let least = if between_dynamic && !bounces { 2.0 * FASTER * least_gain } else { SLOW * least_gain };
@@ -119,11 +118,7 @@ fn find<L: Lanes>(
             let speed = of(&any, lane);
             let hit = &contacts[contact.entries()[first + lane] as usize];
             let e = if bounces { hit.restitution } else { 0.0 };
-            let is_stopped = speed > of(&stops_at, lane)
-                && inelastic_except.is_some_and(|joined| {
-                    let is_joined = |body: u32| joined.get(body as usize) == Some(&true);
-                    !is_joined(hit.body_a) && !is_joined(hit.body_b)
-                });
+            let is_stopped = stops && speed > of(&stops_at, lane);
             if is_stopped || e * speed > BOUNCES * of(&bounces_at, lane) && e > 0.0 {
                 found.push((segment.first_lane + first + lane) as u32);
             }

@@ -49,6 +49,7 @@ mod find;
 mod law;
 mod pair;
 mod point;
+mod whole;
 
 use crate::constraints::impacts::touch::Round;
 use crate::disjoint::DisjointSets;
@@ -57,6 +58,7 @@ use law::{lossy_impulses, rough_impulses};
 pub(crate) use point::PropagationInput;
 use point::{Body, HitPoint, Role, STILL};
 use std::collections::VecDeque;
+use whole::WaveJoints;
 
 /// No lane, no point.
 const NONE: u32 = u32::MAX;
@@ -106,10 +108,13 @@ pub struct ImpactPropagation {
     points: Vec<HitPoint>,
     /// Bodies that were pushed since their points were last visited.
     queue: VecDeque<u32>,
-    /// Bodies of the island that were pushed.
-    pushed: Vec<u32>,
-    /// The first point of the island.
+    /// Bodies of the island that were pushed, with their velocities before that.
+    pushed: Vec<(u32, [f32; 3])>,
+    /// Joints of the island.
+    joints: WaveJoints,
+    /// The first point of the island, and the end of those that were hit from outside.
     first: usize,
+    arrived: usize,
     /// Number of visits to points of the island.
     visits: usize,
     /// Approach speed below which a point counts as solved (m/s).
@@ -166,10 +171,11 @@ impl ImpactPropagation {
     fn island(&mut self, on: &mut PropagationInput<'_>, hit: std::ops::Range<usize>) -> bool {
         (self.first, self.visits) = (self.points.len(), 0);
         self.pushed.clear();
+        self.joints.clear();
         for i in hit {
             self.list(on, self.hit[i].1);
         }
-        let arrived = self.points.len();
+        self.arrived = self.points.len();
         let mut is_done = false;
         for wave in 0..WAVES[0] {
             let bounces = wave + WAVES[1] < WAVES[0];
@@ -185,17 +191,16 @@ impl ImpactPropagation {
                 is_done = true;
                 break;
             }
-            let known = if wave == 0 { arrived } else { self.points.len() };
+            let known = if wave == 0 { self.arrived } else { self.points.len() };
             for place in self.first..known {
                 self.visit(on, place, bounces);
             }
-            let is_solved = self.spread(on, bounces);
-            if !is_solved {
+            if !self.spread(on, bounces) && !self.whole(on, bounces) {
                 break;
             }
         }
-        for &row in &self.pushed {
-            if !on.timed || on.joined.get(row as usize) == Some(&true) {
+        for &(row, _) in &self.pushed {
+            if !on.timed || self.joints.has(row) {
                 on.rows[row as usize].delta[..3].fill(0.0);
             }
         }
@@ -209,19 +214,19 @@ impl ImpactPropagation {
     fn stay(&mut self, on: &mut PropagationInput<'_>) {
         let deeper = DEEPER * on.slop;
         for i in 0..self.pushed.len() {
-            let mut end = self.bodies[self.pushed[i] as usize].first;
+            let mut end = self.bodies[self.pushed[i].0 as usize].first;
             while end != NONE {
                 self.list(on, end / 2);
                 end = self.next[end as usize];
             }
         }
-        self.pushed.clear();
+        let mut stays: Vec<u32> = vec![];
         for point in self.points[self.first..].iter().filter(|point| point.exists) {
             if point.gap(on.rows) < point.separation.min(0.0) - deeper {
-                self.pushed.extend(&point.rows[usize::from(!point.pushes_a)..]);
+                stays.extend(&point.rows[usize::from(!point.pushes_a)..]);
             }
         }
-        for &row in &self.pushed {
+        for row in stays {
             on.rows[row as usize].delta[..3].fill(0.0);
         }
     }
@@ -322,9 +327,9 @@ impl ImpactPropagation {
                 self.visit(on, first + 1, bounces);
             }
             let points = self.points.len() - self.first;
-            is_done = self.visits <= on.visits * points.min(FIRST) + points.saturating_sub(FIRST);
+            is_done = !self.joints.act() && self.visits <= on.visits * points.min(FIRST) + points.saturating_sub(FIRST);
         }
-        is_done
+        is_done && !self.joints.act()
     }
 
     /// Solves both normal impulses of a contact together, if both are positive and alternating visits would
@@ -364,18 +369,18 @@ impl ImpactPropagation {
         }
     }
 
-    /// Solves a point, if it approaches fast enough or was hit before.
-    fn visit(&mut self, on: &mut PropagationInput<'_>, place: usize, bounces: bool) {
+    /// Whether a point takes part in the wave: it does if it was hit before, or approaches fast enough.
+    fn admit(&mut self, on: &mut PropagationInput<'_>, place: usize, bounces: bool) -> bool {
         let point = &mut self.points[place];
         if !point.exists || point.role == Role::Left && bounces {
-            return;
+            return false;
         }
         let mut touch = None;
         if matches!(point.role, Role::Open | Role::Left) {
-            let Some(mut time) = arrival(point, on, self.slowest) else { return };
+            let Some(mut time) = arrival(point, on, self.slowest) else { return false };
             if bounces && will_bounce(point, on) {
                 // In the next wave.
-                return;
+                return false;
             }
             if let Some(round) = on.round(point) {
                 let ends = point.rows.map(|row| &on.rows[row as usize]);
@@ -384,14 +389,25 @@ impl ImpactPropagation {
             if let Some(frame) = &touch {
                 let mut turned = *point;
                 turned.turn(frame, on.rows);
-                let Some(then) = arrival(&turned, on, self.slowest) else { return };
+                let Some(then) = arrival(&turned, on, self.slowest) else { return false };
                 (*point, time) = (turned, then);
                 on.turn(point, frame);
                 on.fall(point);
             }
             point.time = if time < -on.dt || !on.timed { 0.0 } else { time };
-            (point.role, point.target) = (Role::Stops, 0.0);
-            point.impulse = [0.0; 2];
+            point.stop();
+        }
+        true
+    }
+
+    /// Solves a point, if it takes part in the wave. Points of bodies with joints are left to [`Self::whole`].
+    fn visit(&mut self, on: &mut PropagationInput<'_>, place: usize, bounces: bool) {
+        if !self.admit(on, place, bounces) {
+            return;
+        }
+        if self.points[place].rows.iter().any(|&row| self.joints.has(row)) {
+            self.joints.join();
+            return;
         }
         self.meet(on, place);
         let point = &mut self.points[place];
@@ -433,8 +449,9 @@ impl ImpactPropagation {
                 continue;
             }
             let body = &mut self.bodies[row as usize];
-            if body.time == STILL.time {
-                self.pushed.push(row);
+            if !std::mem::replace(&mut body.is_pushed, true) {
+                let [x, y, spin, _] = on.rows[row as usize].velocity;
+                self.pushed.push((row, [x, y, spin]));
             }
             body.time = body.time.max(time);
             if !std::mem::replace(&mut body.is_queued, true) {
@@ -454,6 +471,7 @@ impl ImpactPropagation {
         self.listed.clear();
         self.listed.resize(lanes, NONE);
         self.points.clear();
+        self.joints.link(on.types, on.rows);
         let mut end = 0;
         for part in 0..2 {
             let batches = &on.batches[part];
@@ -469,6 +487,11 @@ impl ImpactPropagation {
                 if moves(a) && moves(b) {
                     self.islands.join(a, b);
                 }
+            }
+        }
+        for &[a, b] in self.joints.ends() {
+            if self.joints.has(a) && self.joints.has(b) {
+                self.islands.join(a, b);
             }
         }
     }

@@ -4,11 +4,13 @@ use super::NONE;
 use super::find::SLOW;
 use crate::constraints::impacts::touch::{Round, TouchFrame, couplings, write_arms};
 use crate::constraints::kernels::frame::turn;
+use crate::constraints::kernels::types::ConstraintSet;
 use crate::constraints::records::batches::Batches;
 use crate::constraints::records::features::{Features, Layout};
 use crate::constraints::records::segment::Segment;
 use crate::contacts::Contact;
 use crate::lanes::{BodyRow, Lanes};
+use crate::narrowphase::lanes::PoseRow;
 
 /// State of a body.
 #[derive(Clone, Copy, Debug)]
@@ -18,10 +20,11 @@ pub(super) struct Body {
     /// Time of the last push (s); −∞ without one.
     pub time: f32,
     pub is_queued: bool,
+    pub is_pushed: bool,
 }
 
 /// A body that nothing has pushed.
-pub(super) const STILL: Body = Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false };
+pub(super) const STILL: Body = Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false, is_pushed: false };
 
 /// Role of a point in a wave.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -97,8 +100,9 @@ pub(crate) struct PropagationInput<'a> {
     pub slop: f32,
     /// Impacts happen at their time in the step, else at its beginning.
     pub timed: bool,
-    /// Bodies with joints, which impacts do not move. `[bodies]`, or empty
-    pub joined: &'a [bool],
+    /// Constraints other than contacts.
+    pub types: &'a mut [ConstraintSet],
+    pub poses: &'a [PoseRow],
     /// Rows take over the frames and arms of impacts; else [`Self::turn`], [`Self::put`] and [`Self::leave`] do nothing.
     pub writes_rows: bool,
     /// Points that an impact releases bear their load until its time.
@@ -271,6 +275,16 @@ impl PropagationInput<'_> {
 }
 
 impl HitPoint {
+    /// Stops its approach from now on.
+    pub fn stop(&mut self) {
+        (self.role, self.target, self.impulse) = (Role::Stops, 0.0, [0.0; 2]);
+    }
+
+    /// Rows of the bodies that impulses move.
+    pub fn moved(&self) -> &[u32] {
+        &self.rows[usize::from(!self.pushes_a)..]
+    }
+
     /// Velocity of b against a along n and t (m/s).
     pub fn velocity(&self, rows: &[BodyRow]) -> [f32; 2] {
         let ([a, b], [nx, ny]) = (self.rows.map(|row| rows[row as usize].velocity), self.normal);

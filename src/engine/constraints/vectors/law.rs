@@ -1,7 +1,6 @@
 //! The contact law of an island around given impulses: the natural map and its norm, the linear problem for
-//! fixed states, a sweep, Lemke's method. See [`super`].
+//! fixed states, a sweep, Lemke's method. See [`crate::solvers::direct`].
 
-use super::{PASSES, PIVOTS, SHIFT, TOLERANCE};
 use crate::constraints::numerics::block_lu::{BlockLu, inverse};
 use crate::constraints::numerics::cone;
 use crate::constraints::numerics::coulomb_lcp::CoulombLcp;
@@ -10,9 +9,18 @@ use crate::constraints::records::rows::{RowBlock, RowLaw};
 use crate::constraints::vectors::system::{Pair, PointRows};
 use crate::lanes::BodyRow;
 
+/// ε: shift added to the unit diagonal (1).
+const SHIFT: f64 = 1e-7;
+/// Most pivots of Lemke's method per unknown.
+const PIVOTS: usize = 10;
+/// Solves of a linear problem: one, and two refinements on the residual.
+const PASSES: usize = 3;
+/// Residual, relative to the largest impulse, at which the law is solved.
+const TOLERANCE: f64 = 1e-10;
+
 /// State of a row in a linear problem.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum State {
+pub(crate) enum State {
     /// u = 0.
     Holds,
     /// λ has this value.
@@ -23,7 +31,7 @@ pub(super) enum State {
 
 /// One row of the Jacobian, scaled to unit masses: J M^(-½).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Row {
+pub(crate) struct Row {
     /// Rows of bodies a and b.
     pub bodies: [u32; 2],
     /// Indices of the bodies among the movable ones; [`IMMOVABLE`] for others.
@@ -127,7 +135,7 @@ struct JointSoftness {
 
 /// The law of an island around the impulses left by the sweeps. Rows 2i and 2i + 1 are the normal and the
 /// tangential row of point i; joint rows follow after the points.
-pub(super) struct IslandLaw {
+pub(crate) struct IslandLaw {
     pub points: Vec<PointRows>,
     friction: Vec<f64>,
     pub rows: Vec<Row>,

@@ -1,0 +1,370 @@
+//! A wave solved as a whole: where visits converge slowly, as from heavy to light bodies, and where joints take part.
+//!
+//! All points of the wave, and the rigid rows and limits of the joints of its bodies, are one problem: Newton's impact law with
+//! Coulomb friction, and J v = 0 for joints ([`IslandLaw`]). It is solved by Newton's method in `f64`. Motors and springs
+//! have bounded forces, so they give no impulse. Bodies that the solution pushes may approach others, which join the
+//! problem, until none does.
+//!
+//! Resting contacts without restitution that are up to [`LAYERS`] bodies away are part of the problem from the start.
+//! They hardly ever change the result, but save a solution for each layer of a wall that lands.
+//!
+//! **Energy.** With e = 0 the law takes energy. With different e, or with friction, Newton's law may create some (Kane's paradox).
+//! So if the bodies of the impact have more energy than before it, and than forces give them in a step, rebounds are
+//! halved, and then left out. If that is too much still, the impact is undone and left to the sweeps.
+//!
+//! **Bound.** [`LARGEST`] points and pairs of joint rows. Each round adds one of them, so it ends.
+
+use super::point::{HitPoint, PropagationInput, Role, STILL};
+use super::{ImpactPropagation, NONE};
+use crate::constraints::kernels::types::{BodyStates, ConstraintSet};
+use crate::constraints::numerics::cone;
+use crate::constraints::records::rows::{RowBlock, RowLaw};
+use crate::constraints::vectors::law::IslandLaw;
+use crate::constraints::vectors::newton::Island;
+use crate::constraints::vectors::system::PointRows;
+use crate::lanes::BodyRow;
+
+/// Most points and pairs of joint rows.
+const LARGEST: usize = 256;
+
+/// Bodies between what is pushed and a resting contact that joins the problem.
+const LAYERS: usize = 4;
+
+/// Gap of a resting contact, as a fraction of the slop (1).
+const CLOSED: f32 = 0.1;
+
+/// Most steps of Newton's method.
+const STEPS: usize = 24;
+
+/// Parts of the rebounds that are tried.
+const PARTS: [f32; 3] = [1.0, 0.5, 0.0];
+
+/// The joints of an island.
+#[derive(Clone, Debug, Default)]
+pub(super) struct WaveJoints {
+    /// The first end of each body that impulses move; joint j has the ends 2 j and 2 j + 1. Empty without joints. `[rows]`
+    first: Vec<u32>,
+    /// The next end of the same body. `[2 joints]`
+    next: Vec<u32>,
+    /// Type of each joint, and its index in the type. `[joints]`
+    places: Vec<[u32; 2]>,
+    /// The bodies of each joint. `[joints]`
+    ends: Vec<[u32; 2]>,
+    /// Whether a joint is in `listed`. `[joints]`
+    is_listed: Vec<bool>,
+    /// Joints that take part.
+    listed: Vec<u32>,
+    /// Their rigid rows and limits, with the impulses of the impact.
+    blocks: Vec<RowBlock>,
+    /// Whether a body with joints was hit.
+    act: bool,
+}
+
+impl WaveJoints {
+    /// Lists the joints of each body.
+    pub fn link(&mut self, types: &[ConstraintSet], rows: &[BodyRow]) {
+        let WaveJoints { first, next, places, ends, is_listed, listed, .. } = self;
+        [&mut *first, &mut *next, &mut *listed].into_iter().for_each(Vec::clear);
+        places.clear();
+        ends.clear();
+        is_listed.clear();
+        if types.is_empty() {
+            return;
+        }
+        first.resize(rows.len(), NONE);
+        for (t, joined) in types.iter().enumerate() {
+            for (i, &pair) in joined.kind.ends().iter().enumerate() {
+                places.push([t as u32, i as u32]);
+                ends.push(pair);
+                for body in pair {
+                    let end = next.len() as u32;
+                    let moves = rows[body as usize].velocity[3] > 0.0;
+                    next.push(if moves {
+                        std::mem::replace(&mut first[body as usize], end)
+                    } else {
+                        NONE
+                    });
+                }
+            }
+        }
+        is_listed.resize(places.len(), false);
+    }
+
+    /// Begins an island.
+    pub fn clear(&mut self) {
+        self.listed.iter().for_each(|&joint| self.is_listed[joint as usize] = false);
+        self.listed.clear();
+        self.blocks.clear();
+        self.act = false;
+    }
+
+    /// The bodies of each joint. `[joints]`
+    pub fn ends(&self) -> &[[u32; 2]] {
+        &self.ends
+    }
+
+    /// Whether a body that impulses move has joints.
+    pub fn has(&self, row: u32) -> bool {
+        self.first.get(row as usize).is_some_and(|&end| end != NONE)
+    }
+
+    /// Notes that a body with joints was hit.
+    pub fn join(&mut self) {
+        self.act = true;
+    }
+
+    /// Whether a body with joints was hit in this island.
+    pub fn act(&self) -> bool {
+        self.act
+    }
+}
+
+impl ImpactPropagation {
+    /// Solves the wave at once. Returns false if it is too large, or would create energy.
+    pub(super) fn whole(&mut self, on: &mut PropagationInput<'_>, bounces: bool) -> bool {
+        let mut size = 0;
+        for row in 0..self.pushed.len() {
+            self.enqueue(self.pushed[row].0);
+        }
+        for place in self.first..self.points.len() {
+            if takes_part(&self.points[place]) {
+                self.enqueue_ends(place);
+            }
+        }
+        loop {
+            self.gather(on, bounces);
+            let points = self.points[self.first..].iter().filter(|point| takes_part(point)).count();
+            let now = points + self.joints.blocks.iter().map(|block| block.size).sum::<usize>().div_ceil(2);
+            if now == size {
+                return true;
+            }
+            size = now;
+            if now > LARGEST && std::env::var_os("DBG").is_some() { eprintln!("too large {now}"); }
+            if now > LARGEST || !self.solve(on) {
+                return false;
+            }
+        }
+    }
+
+    /// Queues a body whose points and joints are to be looked at.
+    fn enqueue(&mut self, row: u32) {
+        if !std::mem::replace(&mut self.bodies[row as usize].is_queued, true) {
+            self.queue.push_back(row);
+        }
+    }
+
+    /// Queues the bodies of a point that impulses move.
+    fn enqueue_ends(&mut self, place: usize) {
+        let point = self.points[place];
+        point.moved().iter().for_each(|&row| self.enqueue(row));
+    }
+
+    /// Adds what the queued bodies touch, and empties the queue.
+    fn gather(&mut self, on: &mut PropagationInput<'_>, bounces: bool) {
+        for _ in 0..LAYERS {
+            for _ in 0..self.queue.len() {
+                let Some(row) = self.queue.pop_front() else { break };
+                self.bodies[row as usize].is_queued = false;
+                if self.points.len() - self.first + self.joints.blocks.len() > 4 * LARGEST {
+                    continue;
+                }
+                self.add_joints(on, row);
+                let mut end = self.bodies[row as usize].first;
+                while end != NONE {
+                    let first = self.list(on, end / 2);
+                    end = self.next[end as usize];
+                    for place in first..first + 2 {
+                        let was_open = self.points[place].role == Role::Open;
+                        let takes_part =
+                            self.admit(on, place, bounces) || was_open && self.add_resting(on, place);
+                        if was_open && takes_part {
+                            self.enqueue_ends(place);
+                        }
+                    }
+                }
+            }
+        }
+        while let Some(row) = self.queue.pop_front() {
+            self.bodies[row as usize].is_queued = false;
+        }
+    }
+
+    /// Adds a point that rests and does not bounce. Returns whether it is one.
+    fn add_resting(&mut self, on: &PropagationInput<'_>, place: usize) -> bool {
+        let point = &mut self.points[place];
+        let rests = point.exists && on.restitution(point) == 0.0 && point.gap(on.rows) < CLOSED * on.slop;
+        if rests {
+            point.stop();
+        }
+        rests
+    }
+
+    /// Adds the joints of a body, and queues the bodies at their other ends.
+    fn add_joints(&mut self, on: &mut PropagationInput<'_>, row: u32) {
+        let mut end = self.joints.first.get(row as usize).copied().unwrap_or(NONE);
+        while end != NONE {
+            let joint = end / 2;
+            end = self.joints.next[end as usize];
+            if std::mem::replace(&mut self.joints.is_listed[joint as usize], true) {
+                continue;
+            }
+            self.joints.listed.push(joint);
+            let [t, i] = self.joints.places[joint as usize];
+            let (states, from) = (BodyStates { rows: on.rows, poses: on.poses }, self.joints.blocks.len());
+            on.types[t as usize].kind.collect(i as usize, states, &mut self.joints.blocks);
+            let mut added = self.joints.blocks.split_off(from);
+            added.retain(|block| matches!(block.law, RowLaw::Rigid | RowLaw::Limit));
+            added.iter_mut().for_each(|block| block.impulses.fill(0.0));
+            self.joints.blocks.append(&mut added);
+            let moved = self.joints.ends[joint as usize].into_iter().filter(|&row| self.joints.has(row));
+            moved.collect::<Vec<_>>().into_iter().for_each(|row| self.enqueue(row));
+        }
+    }
+
+    /// Solves the problem of all points and joints that take part. Returns false, and undoes the impact, if it creates energy.
+    fn solve(&mut self, on: &mut PropagationInput<'_>) -> bool {
+        let places: Vec<usize> =
+            (self.first..self.points.len()).filter(|&place| takes_part(&self.points[place])).collect();
+        let timed = on.timed && self.joints.blocks.is_empty();
+        if timed {
+            self.share_times(on, &places);
+            places.iter().for_each(|&place| self.meet(on, place));
+        }
+        for part in PARTS {
+            let of = |i: usize| &self.points[places[i]];
+            let all = 0..places.len();
+            let rows = all.clone().map(|i| point_rows(of(i), i)).collect();
+            let impulses: Vec<_> = all.clone().map(|i| of(i).impulse).collect();
+            let velocities: Vec<_> = all
+                .clone()
+                .map(|i| {
+                    let ([vn, vt], point) = (of(i).velocity(on.rows), of(i));
+                    let gap = if timed || point.role == Role::Bounces { 0.0 } else { point.gap(on.rows).max(0.0) };
+                    [part.mul_add(-point.target, vn) + gap / on.dt, vt]
+                })
+                .collect();
+            let surfaces: Vec<_> = all.clone().map(|i| [of(i).separation, of(i).friction]).collect();
+            let mut law = IslandLaw::new(rows, on.rows, &impulses, &velocities, &surfaces);
+            for block in &self.joints.blocks {
+                law.join(on.rows, block, 0.0, on.dt);
+            }
+            let mut island = Island::new(law);
+            for _ in 0..STEPS {
+                self.visits += places.len();
+                if !island.step() {
+                    break;
+                }
+            }
+            if std::env::var_os("DBG").is_some() { eprintln!("solve {} points {} blocks part {part} merit {:e} goal {:e} visits {}", places.len(), self.joints.blocks.len(), island.merit, island.law.goal(&island.impulses), self.visits); }
+            for (i, &place) in places.iter().enumerate() {
+                let normal = island.impulses[2 * i].max(0.0) as f32;
+                let bound = self.points[place].friction * normal;
+                self.change(on, place, [normal, cone::friction(island.impulses[2 * i + 1] as f32, bound)]);
+            }
+            let mut first = 2 * places.len();
+            for b in 0..self.joints.blocks.len() {
+                let [a, b_] = self.joints.blocks[b].bodies;
+                [a, b_].into_iter().for_each(|row| self.note_push(on, row));
+                let block = &mut self.joints.blocks[b];
+                island.push(first..first + block.size, &mut block.impulses, on.rows);
+                first += block.size;
+            }
+            for &(row, before) in &self.pushed {
+                let (BodyRow { velocity, delta }, time) =
+                    (&mut on.rows[row as usize], self.bodies[row as usize].time);
+                let time = if timed { time.max(-on.dt) } else { 0.0 };
+                (0..3).for_each(|k| delta[k] = time * (before[k] - velocity[k]));
+            }
+            if !self.gains_energy(on) {
+                return true;
+            }
+        }
+        if std::env::var_os("DBG").is_some() { eprintln!("undo"); }
+        self.undo(on);
+        false
+    }
+
+    /// Gives each body of the wave the time of its own points that were hit from outside, or that of a body it touches.
+    fn share_times(&mut self, on: &PropagationInput<'_>, places: &[usize]) {
+        let ImpactPropagation { points, bodies, arrived, .. } = self;
+        for &place in places {
+            points[place].moved().iter().for_each(|&row| bodies[row as usize].time = STILL.time);
+        }
+        for &place in places.iter().filter(|&&place| place < *arrived) {
+            for &row in points[place].moved() {
+                let time = &mut bodies[row as usize].time;
+                *time = time.max(points[place].time);
+            }
+        }
+        let mut any = true;
+        while std::mem::take(&mut any) {
+            for &place in places {
+                let known = points[place].moved().iter().map(|&row| bodies[row as usize].time);
+                let known = known.fold(STILL.time, f32::max);
+                for &row in points[place].moved() {
+                    let time = &mut bodies[row as usize].time;
+                    if *time == STILL.time && known > STILL.time {
+                        (*time, any) = (known, true);
+                    }
+                }
+            }
+        }
+        for &place in places.iter().filter(|&&place| place >= *arrived) {
+            points[place].time = -on.dt;
+        }
+    }
+
+    /// Notes that a joint pushes a body.
+    fn note_push(&mut self, on: &PropagationInput<'_>, row: u32) {
+        if !self.joints.has(row) {
+            return;
+        }
+        if !std::mem::replace(&mut self.bodies[row as usize].is_pushed, true) {
+            let [x, y, spin, _] = on.rows[row as usize].velocity;
+            self.pushed.push((row, [x, y, spin]));
+        }
+        self.enqueue(row);
+    }
+
+    /// Whether pushed bodies have more energy than before, and than forces give them in a step.
+    fn gains_energy(&self, on: &PropagationInput<'_>) -> bool {
+        let (mut gain, mut given) = (0.0_f64, 0.0_f64);
+        for &(row, before) in &self.pushed {
+            let BodyRow { velocity, delta } = on.rows[row as usize];
+            let [x, y, turn, _] = on.increments[row as usize];
+            let mass = |inverse: f32| if inverse > 0.0 { 1.0 / f64::from(inverse) } else { 0.0 };
+            let forces = [x, y, turn].map(|per_substep| f64::from(per_substep * on.dt / on.h));
+            for (k, mass) in [mass(velocity[3]), mass(velocity[3]), mass(delta[3])].into_iter().enumerate() {
+                let [old, new] = [before[k], velocity[k]].map(f64::from);
+                gain += 0.5 * mass * (new * new - old * old);
+                given += mass * (forces[k] * new).abs().max((forces[k] * old).abs());
+            }
+        }
+        gain > given
+    }
+
+    /// Takes back all impulses of the island.
+    fn undo(&mut self, on: &mut PropagationInput<'_>) {
+        for &(row, [x, y, spin]) in &self.pushed {
+            let row = &mut on.rows[row as usize];
+            (row.velocity[0], row.velocity[1], row.velocity[2]) = (x, y, spin);
+            row.delta[..3].fill(0.0);
+        }
+        for point in &mut self.points[self.first..] {
+            (point.impulse, point.given) = ([0.0; 2], [0.0; 2]);
+        }
+    }
+}
+
+/// Whether a point is solved in the present wave.
+fn takes_part(point: &HitPoint) -> bool {
+    point.exists && matches!(point.role, Role::Stops | Role::Bounces)
+}
+
+/// The rows of a point, with this index.
+fn point_rows(point: &HitPoint, at: usize) -> PointRows {
+    let ([nx, ny], [a, b]) = (point.normal, point.arms);
+    // Impulses do not change a body that moves on a given path.
+    let bodies = if point.pushes_a { point.rows } else { [NONE, point.rows[1]] };
+    PointRows { at, bodies, axes: [[nx, ny], [ny, -nx]], arms: [[a[0], b[0]], [a[1], b[1]]] }
+}
