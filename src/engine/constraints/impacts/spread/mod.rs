@@ -112,9 +112,10 @@ pub struct ImpactPropagation {
     pushed: Vec<(u32, [f32; 3])>,
     /// Joints of the island.
     joints: WaveJoints,
-    /// The first point of the island, and the end of those that were hit from outside.
+    /// The first point of the island.
     first: usize,
-    arrived: usize,
+    /// When its first points, those that were hit from outside, close their gaps (s).
+    arrivals: Vec<f32>,
     /// Number of visits to points of the island.
     visits: usize,
     /// Approach speed below which a point counts as solved (m/s).
@@ -175,7 +176,7 @@ impl ImpactPropagation {
         for i in hit {
             self.list(on, self.hit[i].1);
         }
-        self.arrived = self.points.len();
+        let arrived = self.points.len();
         let mut is_done = false;
         for wave in 0..WAVES[0] {
             let bounces = wave + WAVES[1] < WAVES[0];
@@ -191,11 +192,19 @@ impl ImpactPropagation {
                 is_done = true;
                 break;
             }
-            let known = if wave == 0 { self.arrived } else { self.points.len() };
+            let known = if wave == 0 { arrived } else { self.points.len() };
+            // All of them at the velocities before the wave.
+            for place in self.first..known {
+                self.admit(on, place, bounces);
+            }
+            if wave == 0 {
+                self.arrivals.clear();
+                self.arrivals.extend(self.points[self.first..].iter().map(|point| point.time));
+            }
             for place in self.first..known {
                 self.visit(on, place, bounces);
             }
-            if !self.spread(on, bounces) && !self.whole(on, bounces) {
+            if !self.spread(on, bounces) && !self.whole(on, wave == 0, bounces) {
                 break;
             }
         }

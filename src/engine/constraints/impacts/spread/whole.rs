@@ -120,8 +120,18 @@ impl WaveJoints {
 }
 
 impl ImpactPropagation {
-    /// Solves the wave at once. Returns false if it is too large, or would create energy.
-    pub(super) fn whole(&mut self, on: &mut PropagationInput<'_>, bounces: bool) -> bool {
+    /// Solves the wave at once, the first one from the velocities before it. Returns false if it is too large, or would create energy.
+    pub(super) fn whole(&mut self, on: &mut PropagationInput<'_>, is_first: bool, bounces: bool) -> bool {
+        let points = |all: &[HitPoint]| all.iter().filter(|point| takes_part(point)).count();
+        if points(&self.points[self.first..]) > LARGEST {
+            return false;
+        }
+        if is_first {
+            self.undo(on);
+            for point in &mut self.points[self.first + self.arrivals.len()..] {
+                point.role = Role::Open;
+            }
+        }
         let mut size = 0;
         for row in 0..self.pushed.len() {
             self.enqueue(self.pushed[row].0);
@@ -133,8 +143,8 @@ impl ImpactPropagation {
         }
         loop {
             self.gather(on, bounces);
-            let points = self.points[self.first..].iter().filter(|point| takes_part(point)).count();
-            let now = points + self.joints.blocks.iter().map(|block| block.size).sum::<usize>().div_ceil(2);
+            let now = points(&self.points[self.first..])
+                + self.joints.blocks.iter().map(|block| block.size).sum::<usize>().div_ceil(2);
             if now == size {
                 return true;
             }
@@ -231,6 +241,7 @@ impl ImpactPropagation {
             places.iter().for_each(|&place| self.meet(on, place));
         }
         for part in PARTS {
+            let t0 = std::time::Instant::now();
             let of = |i: usize| &self.points[places[i]];
             let all = 0..places.len();
             let rows = all.clone().map(|i| point_rows(of(i), i)).collect();
@@ -255,7 +266,7 @@ impl ImpactPropagation {
                     break;
                 }
             }
-            if std::env::var_os("DBG").is_some() { eprintln!("solve {} points {} blocks part {part} merit {:e} goal {:e} visits {}", places.len(), self.joints.blocks.len(), island.merit, island.law.goal(&island.impulses), self.visits); }
+            if std::env::var_os("DBG").is_some() { eprintln!("solve {} points {} blocks part {part} merit {:e} goal {:e} visits {} us {:?} movable {}", places.len(), self.joints.blocks.len(), island.merit, island.law.goal(&island.impulses), self.visits, t0.elapsed(), island.law.movable); }
             for (i, &place) in places.iter().enumerate() {
                 let normal = island.impulses[2 * i].max(0.0) as f32;
                 let bound = self.points[place].friction * normal;
@@ -286,14 +297,16 @@ impl ImpactPropagation {
 
     /// Gives each body of the wave the time of its own points that were hit from outside, or that of a body it touches.
     fn share_times(&mut self, on: &PropagationInput<'_>, places: &[usize]) {
-        let ImpactPropagation { points, bodies, arrived, .. } = self;
+        let ImpactPropagation { points, bodies, first, arrivals, .. } = self;
+        let is_hit = |place: usize| arrivals.get(place - *first).copied();
         for &place in places {
             points[place].moved().iter().for_each(|&row| bodies[row as usize].time = STILL.time);
         }
-        for &place in places.iter().filter(|&&place| place < *arrived) {
+        for &place in places {
+            let Some(arrival) = is_hit(place) else { continue };
             for &row in points[place].moved() {
                 let time = &mut bodies[row as usize].time;
-                *time = time.max(points[place].time);
+                *time = time.max(arrival);
             }
         }
         let mut any = true;
@@ -309,8 +322,8 @@ impl ImpactPropagation {
                 }
             }
         }
-        for &place in places.iter().filter(|&&place| place >= *arrived) {
-            points[place].time = -on.dt;
+        for &place in places {
+            points[place].time = is_hit(place).unwrap_or(-on.dt);
         }
     }
 
