@@ -123,9 +123,8 @@ impl World {
         narrow.count = self.contacts.len();
         let Narrow { candidates, of_kind, poses, frozen, .. } = narrow;
         frozen.note(Candidates { all: candidates, of_kind, poses }, &mut self.contacts);
-        let narrow = &self.narrow;
         let kept = &mut self.work.kept;
-        kept.follow(self.solver_is.kept, &self.contacts, self.bodies.len(), narrow.is_changed);
+        kept.follow(self.solver_is.kept, &self.contacts, self.bodies.len());
         self.with_scene(|solver, scene| solver.after_collision(scene));
         self.counts.pairs = self.narrow.candidates.len();
         self.counts.contacts = self.contacts.len();
@@ -153,21 +152,17 @@ impl World {
 
     /// Calls a collision hook of the solver.
     fn with_scene(&mut self, hook: impl FnOnce(&mut dyn Solver, &mut CollisionScene<'_>)) {
-        let Narrow { candidates, of_kind, poses, is_changed, .. } = &self.narrow;
+        let Narrow { candidates, of_kind, poses, .. } = &self.narrow;
         let mut scene = CollisionScene {
             bodies: &self.bodies,
             contacts: &mut self.contacts,
-            kept: &mut self.work.kept,
             types: &self.work.types,
             candidates: Candidates { all: candidates, of_kind, poses },
-            contacts_changed: *is_changed,
-            step_index: self.step_index,
             parameters: self.settings.scaled_parameters(),
             without: self.settings.without,
             gravity: Vec2::from(self.settings.gravity),
             dt: self.settings.dt,
             length_unit: self.settings.length_unit,
-            substeps: self.settings.budget.substeps,
         };
         hook(self.solver.as_mut(), &mut scene);
     }

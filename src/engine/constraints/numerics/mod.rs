@@ -7,4 +7,3 @@ pub mod envelope;
 pub mod lemke;
 pub mod matrix;
 pub mod small;
-pub(crate) mod supports;

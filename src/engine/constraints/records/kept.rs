@@ -1,4 +1,4 @@
-//! Numbers that a solver keeps from step to step, per contact, per contact point and per body.
+//! Numbers that a solver keeps from step to step, per contact point and per body.
 //!
 //! The solver defines what they mean: multipliers, penalties, rest lengths. A contact point is recognized by
 //! its shape pair and its feature id, as for its impulses. A new point starts with zeros. Solvers that keep
@@ -11,8 +11,6 @@ use crate::lanes::LaneVec;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StateSize {
-    /// Floats per contact, a multiple of four.
-    pub per_contact: usize,
     /// Floats per contact point.
     pub per_point: usize,
     /// Floats per body.
@@ -21,7 +19,7 @@ pub struct StateSize {
 
 impl StateSize {
     /// Nothing is kept.
-    pub const NONE: StateSize = StateSize { per_contact: 0, per_point: 0, per_body: 0 };
+    pub const NONE: StateSize = StateSize { per_point: 0, per_body: 0 };
 }
 
 /// The kept numbers; see the [module](self).
@@ -31,16 +29,12 @@ pub struct SolverState {
     size: StateSize,
     /// Shape pair and feature ids of each contact, by which its numbers are found again.
     names: Vec<(u64, [u32; 2])>,
-    /// `[contacts × per_contact]`
-    contacts: LaneVec,
     /// `[2 × contacts × per_point]`, first points of all contacts before second ones.
     points: LaneVec,
     /// `[bodies × per_body]`
     bodies: Vec<f32>,
     #[cfg_attr(feature = "serde", serde(skip))]
     last_names: Vec<(u64, [u32; 2])>,
-    #[cfg_attr(feature = "serde", serde(skip))]
-    last_contacts: LaneVec,
     #[cfg_attr(feature = "serde", serde(skip))]
     last_points: LaneVec,
 }
@@ -49,23 +43,9 @@ pub struct SolverState {
 const UNUSED: u32 = u32::MAX;
 
 impl SolverState {
-    /// Floats per contact, contact point and body.
+    /// Floats per contact point and body.
     pub fn size(&self) -> StateSize {
         self.size
-    }
-
-    /// Numbers of contact `contact`.
-    ///
-    /// # Panics
-    /// If there is no such contact, or nothing is kept.
-    pub fn contact(&mut self, contact: usize) -> &mut [f32] {
-        let size = self.size.per_contact;
-        &mut self.contacts[contact * size..][..size]
-    }
-
-    /// All numbers of contacts, `[contacts × per_contact]`, for gathers by contact.
-    pub fn contacts(&mut self) -> &mut [f32] {
-        &mut self.contacts
     }
 
     /// Numbers of point `point` (0 or 1) of contact `contact`.
@@ -87,10 +67,9 @@ impl SolverState {
         &mut self.bodies[body * size..][..size]
     }
 
-    /// Whether the arrays of contacts and points have the right lengths. Data from a file may not.
+    /// Whether the array of points has the right length. Data from a file may not.
     pub fn is_consistent(&self) -> bool {
-        let (StateSize { per_contact, per_point, .. }, contacts) = (self.size, self.names.len());
-        self.points.len() == 2 * contacts * per_point && self.contacts.len() == contacts * per_contact
+        self.points.len() == 2 * self.names.len() * self.size.per_point
     }
 
     /// Sets the numbers of body `body` to zero. For a body that takes the index of a removed one.
@@ -114,29 +93,20 @@ impl SolverState {
         self.points.split_at_mut(seconds).into()
     }
 
-    /// Assigns the numbers to the contacts of the coming step, which are sorted by shape pair. `changed`:
-    /// contacts may have come or gone since the last call.
-    pub fn follow(&mut self, size: StateSize, contacts: &[Contact], bodies: usize, changed: bool) {
+    /// Assigns the numbers to the contacts of the coming step, which are sorted by shape pair.
+    pub fn follow(&mut self, size: StateSize, contacts: &[Contact], bodies: usize) {
         if size != self.size {
             *self = SolverState { size, ..SolverState::default() };
         }
         self.bodies.resize(bodies * size.per_body, 0.0);
-        let is_same = !changed && self.names.len() == contacts.len();
-        // The points of a contact may have changed even then.
-        if size.per_point == 0 && (size.per_contact == 0 || is_same) {
+        if size.per_point == 0 {
             return;
         }
         std::mem::swap(&mut self.names, &mut self.last_names);
-        std::mem::swap(&mut self.contacts, &mut self.last_contacts);
         std::mem::swap(&mut self.points, &mut self.last_points);
         self.names.clear();
-        for (list, length) in [
-            (&mut self.contacts, contacts.len() * size.per_contact),
-            (&mut self.points, contacts.len() * 2 * size.per_point),
-        ] {
-            list.resize(0);
-            list.resize(length);
-        }
+        self.points.resize(0);
+        self.points.resize(contacts.len() * 2 * size.per_point);
         let mut last = self.last_names.iter().enumerate().peekable();
         for (i, contact) in contacts.iter().enumerate() {
             let m = &contact.manifold;
@@ -146,7 +116,6 @@ impl SolverState {
             // Both lists are sorted: one pass over them finds all pairs.
             while last.next_if(|(_, (k, _))| *k < key).is_some() {}
             let Some((j, (_, old_ids))) = last.next_if(|(_, (k, _))| *k == key) else { continue };
-            copy(&mut self.contacts, i, &self.last_contacts, j, size.per_contact);
             for (p, id) in ids.into_iter().enumerate().filter(|&(_, id)| id != UNUSED) {
                 if let Some(q) = old_ids.iter().position(|&old| old == id) {
                     let (to, from) = (p * contacts.len() + i, q * self.last_names.len() + j);
@@ -177,24 +146,22 @@ mod tests {
 
     #[test]
     fn numbers_follow_the_feature_through_sorting_and_exchange() {
-        let size = StateSize { per_contact: 4, per_point: 1, per_body: 2 };
+        let size = StateSize { per_point: 1, per_body: 2 };
         let mut kept = SolverState::default();
-        kept.follow(size, &[contact([0, 2], &[5, 9]), contact([1, 2], &[0])], 3, true);
-        kept.contact(0)[3] = 12.0;
+        kept.follow(size, &[contact([0, 2], &[5, 9]), contact([1, 2], &[0])], 3);
         kept.point(0, 0)[0] = 5.0;
         kept.point(0, 1)[0] = 9.0;
         kept.point(1, 0)[0] = 1.0;
         kept.body(2).copy_from_slice(&[7.0, 8.0]);
         // A new pair in front; the points of 0-2 swapped; 1-2 removed and 1-3 added.
-        kept.follow(size, &[contact([0, 1], &[0]), contact([0, 2], &[9, 5]), contact([1, 3], &[0])], 4, true);
+        kept.follow(size, &[contact([0, 1], &[0]), contact([0, 2], &[9, 5]), contact([1, 3], &[0])], 4);
         assert_eq!(kept.points(), [0.0, 9.0, 0.0, 0.0, 5.0, 0.0]);
-        assert_eq!(kept.contacts(), [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 12.0, 0.0, 0.0, 0.0, 0.0]);
         assert_eq!([kept.body(2), &mut [0.0, 0.0]], [&[7.0, 8.0], &[0.0, 0.0]]);
         // Another feature of the same pair is a new point.
-        kept.follow(size, &[contact([0, 2], &[9, 6])], 4, false);
+        kept.follow(size, &[contact([0, 2], &[9, 6])], 4);
         assert_eq!(kept.points(), [9.0, 0.0]);
         // Another solver keeps other numbers.
-        kept.follow(StateSize::default(), &[contact([0, 2], &[9, 6])], 4, false);
+        kept.follow(StateSize::default(), &[contact([0, 2], &[9, 6])], 4);
         assert!(kept.points().is_empty());
     }
 }

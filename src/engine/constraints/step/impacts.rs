@@ -18,11 +18,6 @@ pub(crate) struct ImpactWaves {
     pub timed: bool,
     /// Whether points that do not bounce are stopped.
     pub stops: bool,
-    /// Whether rows take over the frames and arms of impacts, and lose the overlap of points that have bounced. If not,
-    /// impacts write bodies and nothing else.
-    pub writes_rows: bool,
-    /// Whether to apply the loads that points carried until an impact released them.
-    pub releases: bool,
     /// Limit of visits for each of the first points of an island; [`VISITS`] where time does not matter.
     pub visits: usize,
 }
@@ -30,7 +25,7 @@ pub(crate) struct ImpactWaves {
 impl Passes<'_> {
     /// Lets approaching points bounce or stop, before the step.
     pub(crate) fn spread_impacts(&mut self, spreading: ImpactWaves) {
-        let ImpactWaves { timed, stops, writes_rows, releases, visits } = spreading;
+        let ImpactWaves { timed, stops, visits } = spreading;
         let (h, dt, slop) = (self.h(), self.dt(), self.slop());
         let bounces = self.law() != ImpactLaw::None;
         if self.contacts.is_empty() {
@@ -59,8 +54,6 @@ impl Passes<'_> {
             timed,
             types,
             poses,
-            writes_rows,
-            releases,
             visits,
             record_impulses: self.input.record_impulses,
             bounces,
@@ -85,13 +78,7 @@ impl Passes<'_> {
                 self.begin_bounces(Rebound { threshold, only_new });
             }
             ImpactLaw::Waves => {
-                self.spread_impacts(ImpactWaves {
-                    timed: false,
-                    stops: false,
-                    writes_rows: true,
-                    releases: true,
-                    visits: VISITS,
-                });
+                self.spread_impacts(ImpactWaves { timed: false, stops: false, visits: VISITS });
             }
         }
     }

@@ -68,7 +68,7 @@ type GroupedContact = ([u32; 2], u32, bool);
 
 /// Finds jams; reuses its memory from step to step.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Jams {
+pub(crate) struct Jams {
     /// Deep contacts, by pair of bodies, and the contacts of each body in a squeeze.
     deep: Vec<GroupedContact>,
     /// Bodies that touch a kinematic one, and how fast its surface is there (m/s).

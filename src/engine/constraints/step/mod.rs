@@ -5,11 +5,10 @@
 
 #[doc(hidden)]
 pub mod assign;
-pub(crate) mod block_substeps;
 mod bodies;
 mod drifts;
 mod impacts;
-mod jams;
+pub(crate) mod jams;
 mod solver;
 mod sweeps;
 mod vectors;

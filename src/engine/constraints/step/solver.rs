@@ -4,7 +4,6 @@ use super::Passes;
 use crate::bodies::Bodies;
 use crate::constraints::kernels::types::ConstraintSet;
 use crate::constraints::records::graph::Graph;
-use crate::constraints::records::kept::SolverState;
 use crate::contacts::Contact;
 use crate::narrowphase::candidate::Candidates;
 use crate::narrowphase::circles::Rolling;
@@ -58,16 +57,10 @@ pub struct CollisionScene<'a> {
     pub bodies: &'a Bodies,
     /// Contacts, sorted by shape pair.
     pub contacts: &'a mut [Contact],
-    /// Numbers that the solver keeps per contact, contact point and body, in the order of `contacts`.
-    pub kept: &'a mut SolverState,
     /// Constraints of other types than contacts.
     pub types: &'a [ConstraintSet],
     /// Pairs of shapes that may touch.
     pub candidates: Candidates<'a>,
-    /// Whether contacts have come or gone since they got their lanes. Valid after the collision.
-    pub contacts_changed: bool,
-    /// Number of steps taken.
-    pub step_index: u64,
     /// The solver's own parameters.
     pub parameters: Parameters,
     /// Mechanisms of the solver that are left out.
@@ -78,15 +71,6 @@ pub struct CollisionScene<'a> {
     pub dt: f32,
     /// Size of typical bodies (m).
     pub length_unit: f32,
-    /// Substeps per step.
-    pub substeps: u32,
-}
-
-impl CollisionScene<'_> {
-    /// Substep (s).
-    pub fn h(&self) -> f32 {
-        self.dt / self.substeps as f32
-    }
 }
 
 /// A solver's requests for the next collision phase.

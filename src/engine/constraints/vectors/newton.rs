@@ -23,7 +23,7 @@ pub(crate) struct Island {
     /// λ (N·s). `[rows]`
     pub impulses: Vec<f64>,
     arguments: Vec<f64>,
-    pub merit: f64,
+    merit: f64,
     /// No improvement was found.
     done: bool,
     /// Steps that left more than half of the merit.

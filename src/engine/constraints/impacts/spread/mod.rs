@@ -12,9 +12,7 @@
 //! the limit of a small one.
 //!
 //! After a body is pushed, its other points are visited, until no approach is faster than 10⁻³ of the first.
-//! Bodies that nothing hits cost nothing. Visiting the two points of a contact in turn leaves a fraction
-//! c²/(k₀ k₁) of the error, with c the velocity that a unit impulse at one adds to the other. If the fraction
-//! is more than half, as for corners that just overlap, both normal impulses are solved together ([`pair`]).
+//! Bodies that nothing hits cost nothing. A wave that visits do not solve is solved as a whole ([`whole`]).
 //!
 //! # Time of the impact within the step
 //!
@@ -33,21 +31,18 @@
 //!
 //! At the time of the impulse the centers have moved relative to each other by D. With the arms of the start
 //! of the step the impulse would add D × λ to the angular momentum. So both arms end at one point at that
-//! time, r_a + D/2 and r_b − D/2, and round shapes have the frame of that time (`touch.rs`). The rows
-//! themselves use these arms and frames: an impulse with an effect that its row leaves out may add energy,
-//! and has shot bodies out of piles.
+//! time, r_a + D/2 and r_b − D/2, and round shapes have the frame of that time (`touch.rs`).
+//! Impacts write the velocities and displacements of bodies and nothing else.
 //!
 //! # A bound for each island
 //!
 //! Bodies connected by contacts form an island. Islands are solved independently, so a scene behaves the same
 //! next to another one. An island has at most 32 waves, of which the last 4 only stop, and a visit limit that
 //! grows with its number of points ([`VISITS`]). The solver stops points that still approach after that.
-//! Bodies of such an island that would end deeper in another body than they began are not moved. So the time
-//! of a step is bounded.
+//! So the time of a step is bounded.
 
 mod find;
 mod law;
-mod pair;
 mod point;
 mod whole;
 
@@ -84,10 +79,6 @@ pub(crate) const VISITS: usize = 18;
 
 /// Number of points to which [`VISITS`] applies.
 const FIRST: usize = 8;
-
-/// How much deeper a point of an island that reached its bound may end, as a fraction of the slop (1): the
-/// residual approach of touching bodies makes them overlap.
-const DEEPER: f32 = 0.1;
 
 /// Solves impacts; keeps its memory from step to step.
 #[derive(Clone, Debug, Default)]
@@ -155,10 +146,6 @@ impl ImpactPropagation {
             begin = end;
         }
         for point in self.points.iter().filter(|point| point.given != [0.0; 2]) {
-            on.put(point);
-            if point.role == Role::Left {
-                on.leave(point);
-            }
             if on.record_impulses {
                 let contact = on.contact_of(point.lane);
                 let sum = &mut on.contacts[contact].step_impulse[usize::from(point.index)];
@@ -188,7 +175,7 @@ impl ImpactPropagation {
             if wave == 0 && self.points[self.first..].iter().any(|point| point.role == Role::Bounces) {
                 self.slowest *= FINER;
             }
-            if !any && wave > 0 && !(on.releases && self.release(on)) {
+            if !any && wave > 0 {
                 is_done = true;
                 break;
             }
@@ -213,31 +200,7 @@ impl ImpactPropagation {
                 on.rows[row as usize].delta[..3].fill(0.0);
             }
         }
-        if on.timed && on.writes_rows && !is_done {
-            self.stay(on);
-        }
         is_done
-    }
-
-    /// Cancels the displacement of bodies that have a point, visited or not, that would end deeper.
-    fn stay(&mut self, on: &mut PropagationInput<'_>) {
-        let deeper = DEEPER * on.slop;
-        for i in 0..self.pushed.len() {
-            let mut end = self.bodies[self.pushed[i].0 as usize].first;
-            while end != NONE {
-                self.list(on, end / 2);
-                end = self.next[end as usize];
-            }
-        }
-        let mut stays: Vec<u32> = vec![];
-        for point in self.points[self.first..].iter().filter(|point| point.exists) {
-            if point.gap(on.rows) < point.separation.min(0.0) - deeper {
-                stays.extend(&point.rows[usize::from(!point.pushes_a)..]);
-            }
-        }
-        for row in stays {
-            on.rows[row as usize].delta[..3].fill(0.0);
-        }
     }
 
     /// Finds the points that bounce in this wave. Returns whether there are any.
@@ -266,7 +229,6 @@ impl ImpactPropagation {
                     // If the turned point does not bounce, the row of the start would still stop it, so it
                     // bounces on that row.
                     if let Some(then) = rebounds(&turned, on, is_first) {
-                        on.turn(&turned, &frame);
                         (*point, target) = (turned, then);
                     }
                 }
@@ -275,43 +237,6 @@ impl ImpactPropagation {
             (point.target, point.time) = (target[0], target[1]);
             (point.slip, point.lost) = (slip, (-v - target[0]).max(0.0));
             (point.role, point.impulse) = (Role::Bounces, [0.0; 2]);
-            any = true;
-        }
-        any
-    }
-
-    /// Applies the loads that points carried until the impact released them. Returns whether there are any.
-    ///
-    /// A block that rocks stands on one corner until the other one is hit. Its load F of the step before belongs to the first
-    /// corner until t, and in the step that is solved from its beginning on, all of it goes to the second: an error of F t
-    /// times the distance of both. So a point that an impact releases, which
-    /// is one that leaves faster than its load can bring it back within the step, gives F t beside the impact (for t < 0 it has
-    /// borne too long, and takes it back from what does not move). A force in [0, t] moves bodies by F t (dt − t/2)/m in the step.
-    fn release(&mut self, on: &mut PropagationInput<'_>) -> bool {
-        let mut any = false;
-        for place in self.first..self.points.len() {
-            let point = self.points[place];
-            let time =
-                point.rows.map(|row| self.bodies[row as usize].time).into_iter().fold(STILL.time, f32::max);
-            if point.role != Role::Open || !point.exists || time == STILL.time {
-                continue;
-            }
-            let speed = point.velocity(on.rows)[0];
-            if speed <= 0.0 {
-                continue;
-            }
-            let borne = on.borne(&point);
-            let brings_back = point.k[0] * borne[0] * (on.dt / on.h);
-            if borne[0] <= 0.0 || speed <= brings_back || Round::is_of(on.contact(&point)) {
-                continue;
-            }
-            on.release(&point);
-            if time < 0.0 && point.pushes_a || !on.timed {
-                continue;
-            }
-            let given = borne.map(|impulse| impulse * (time / on.h));
-            self.points[place].given = given;
-            self.push(on, place, given, [0.5 * time, time]);
             any = true;
         }
         any
@@ -331,7 +256,6 @@ impl ImpactPropagation {
                 let lane = end / 2;
                 end = self.next[end as usize];
                 let first = self.list(on, lane);
-                self.visit_both(on, first);
                 self.visit(on, first, bounces);
                 self.visit(on, first + 1, bounces);
             }
@@ -339,29 +263,6 @@ impl ImpactPropagation {
             is_done = !self.joints.act() && self.visits <= on.visits * points.min(FIRST) + points.saturating_sub(FIRST);
         }
         is_done && !self.joints.act()
-    }
-
-    /// Solves both normal impulses of a contact together, if both are positive and alternating visits would
-    /// converge slowly.
-    fn visit_both(&mut self, on: &mut PropagationInput<'_>, first: usize) {
-        let pushes = |p: &HitPoint| p.impulse[0] > 0.0 && matches!(p.role, Role::Stops | Role::Bounces);
-        if !self.points[first].is_tight || !self.points[first..first + 2].iter().all(pushes) {
-            return;
-        }
-        self.visits += 1;
-        self.meet(on, first);
-        self.meet(on, first + 1);
-        let points = [self.points[first], self.points[first + 1]];
-        let wanted = points.map(|point| point.target - point.velocity(on.rows)[0]);
-        if wanted[0].abs().max(wanted[1].abs()) <= self.slowest {
-            return;
-        }
-        let (k, old) = (points.map(|point| point.k[0]), points.map(|point| point.impulse[0]));
-        let coupling = points[0].coupling(&points[1], on.rows);
-        let Some(new) = pair::impulses(k, coupling, old, wanted) else { return };
-        for i in 0..2 {
-            self.change(on, first + i, [new[i], points[i].impulse[1]]);
-        }
     }
 
     /// Moves a point to the middle between the positions of its bodies at the time of its impact.
@@ -400,7 +301,6 @@ impl ImpactPropagation {
                 turned.turn(frame, on.rows);
                 let Some(then) = arrival(&turned, on, self.slowest) else { return false };
                 (*point, time) = (turned, then);
-                on.turn(point, frame);
                 on.fall(point);
             }
             point.time = if time < -on.dt || !on.timed { 0.0 } else { time };
@@ -446,12 +346,11 @@ impl ImpactPropagation {
         point.given = [point.given[0] + delta[0], point.given[1] + delta[1]];
         point.impulse = new;
         let time = point.time;
-        self.push(on, place, delta, [time; 2]);
+        self.push(on, place, delta, time);
     }
 
-    /// Applies an impulse (N·s) to both bodies of a point and queues them. The impulse acts until `time` (s),
-    /// and at `at` (s) on average.
-    fn push(&mut self, on: &mut PropagationInput<'_>, place: usize, impulse: [f32; 2], [at, time]: [f32; 2]) {
+    /// Applies an impulse (N·s) to both bodies of a point at `time` (s), and queues them.
+    fn push(&mut self, on: &mut PropagationInput<'_>, place: usize, impulse: [f32; 2], time: f32) {
         let point = &self.points[place];
         for (row, is_pushed) in point.rows.into_iter().zip([point.pushes_a, true]) {
             if !is_pushed {
@@ -467,7 +366,7 @@ impl ImpactPropagation {
                 self.queue.push_back(row);
             }
         }
-        point.push(on.rows, impulse, if on.timed { at } else { 0.0 });
+        point.push(on.rows, impulse, if on.timed { time } else { 0.0 });
     }
 
     /// Links the ends of each body, and joins bodies in contact into islands.
@@ -520,9 +419,6 @@ impl ImpactPropagation {
             self.points.resize(first + 2, HitPoint::default());
             let points = &mut self.points[first..];
             on.read_points(lane, points);
-            let [k_0, k_1] = [points[0].k[0], points[1].k[0]];
-            points[0].is_tight =
-                points[1].exists && points[0].coupling(&points[1], on.rows).powi(2) > 0.5 * k_0 * k_1;
         }
         *listed as usize
     }

@@ -2,7 +2,7 @@
 
 use super::NONE;
 use super::find::SLOW;
-use crate::constraints::impacts::touch::{Round, TouchFrame, couplings, write_arms};
+use crate::constraints::impacts::touch::{Round, TouchFrame, couplings};
 use crate::constraints::kernels::frame::turn;
 use crate::constraints::kernels::types::ConstraintSet;
 use crate::constraints::records::batches::Batches;
@@ -80,15 +80,13 @@ pub(super) struct HitPoint {
     pub apart: [f32; 2],
     /// Whether it has the frame of its time of touch, see [`HitPoint::turn`].
     pub is_turned: bool,
-    /// On the first point: whether its coupling with the second is strong.
-    pub is_tight: bool,
 }
 
 /// The data that [`super::ImpactPropagation::run`] works on.
 pub(crate) struct PropagationInput<'a> {
     pub rows: &'a mut [BodyRow],
     /// Colored batches, serial ones.
-    pub batches: [&'a mut Batches; 2],
+    pub batches: [&'a Batches; 2],
     pub contacts: &'a mut [Contact],
     pub features: &'a Features,
     /// Changes of velocity by forces in a substep (m/s).
@@ -103,10 +101,6 @@ pub(crate) struct PropagationInput<'a> {
     /// Constraints other than contacts.
     pub types: &'a mut [ConstraintSet],
     pub poses: &'a [PoseRow],
-    /// Rows take over the frames and arms of impacts; else [`Self::turn`], [`Self::put`] and [`Self::leave`] do nothing.
-    pub writes_rows: bool,
-    /// Points that an impact releases bear their load until its time.
-    pub releases: bool,
     /// Most visits for each of the first points of an island.
     pub visits: usize,
     pub record_impulses: bool,
@@ -155,50 +149,6 @@ impl PropagationInput<'_> {
         }
     }
 
-    /// Writes the frame of the time of touch to the record of a point.
-    pub(super) fn turn(&mut self, point: &HitPoint, frame: &TouchFrame) {
-        if !self.writes_rows {
-            return;
-        }
-        let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
-        let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
-        let rows = point.rows.map(|row| &self.rows[row as usize]);
-        frame.write_record(&layout, rows, |vector, value| floats[first + vector * width] = value);
-    }
-
-    /// Writes the arms of the impact to the record, for the rest of the step.
-    pub(super) fn put(&mut self, point: &HitPoint) {
-        if !self.writes_rows {
-            return;
-        }
-        let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
-        let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
-        let put = |vector: usize, value: f32| floats[first + vector * width] = value;
-        write_arms(&layout, point.index.into(), point.arms, [1.0 / point.k[0], 1.0 / point.k[1]], put);
-    }
-
-    /// Removes the overlap of a point that has bounced from its record: it separates without a push.
-    pub(super) fn leave(&mut self, point: &HitPoint) {
-        if !self.writes_rows {
-            return;
-        }
-        let raised = point.gap(self.rows).min(0.0);
-        let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
-        let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
-        floats[first + layout.at(point.index.into(), layout.separation) * width] -= raised;
-    }
-
-    /// Removes a point's load.
-    pub(super) fn release(&mut self, point: &HitPoint) {
-        let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
-        let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
-        let mut forget = |of: usize| floats[first + layout.at(point.index.into(), of) * width] = 0.0;
-        forget(layout.normal_impulse);
-        if layout.has_friction {
-            forget(layout.tangent_impulse);
-        }
-    }
-
     /// Computes the effect of forces on both bodies of a point.
     pub(super) fn fall(&self, point: &mut HitPoint) {
         let [a, b] = point.rows.map(|row| {
@@ -232,14 +182,6 @@ impl PropagationInput<'_> {
     /// Coefficient of restitution of a point (1).
     pub(super) fn restitution(&self, point: &HitPoint) -> f32 {
         if self.bounces { self.contact(point).restitution } else { 0.0 }
-    }
-
-    /// Impulses of a point along n and t in the last substep (N·s).
-    pub(super) fn borne(&self, point: &HitPoint) -> [f32; 2] {
-        let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
-        let floats: &[f32] = bytemuck::cast_slice(self.batches[part].records());
-        let at = |quantity: usize| floats[first + layout.at(point.index.into(), quantity) * width];
-        [at(layout.normal_impulse), if layout.has_friction { at(layout.tangent_impulse) } else { 0.0 }]
     }
 
     /// Fills in the points of a lane; those that it does not have are unchanged.
@@ -292,16 +234,6 @@ impl HitPoint {
         let [of_a, of_b] = self.arms;
         let along = [nx.mul_add(x, ny * y), ny.mul_add(x, -(nx * y))];
         std::array::from_fn(|i| b[2].mul_add(of_b[i], a[2].neg_mul_add(of_a[i], along[i])))
-    }
-
-    /// Normal velocity that a unit normal impulse at another point of the contact adds (1/kg).
-    pub fn coupling(&self, other: &HitPoint, rows: &[BodyRow]) -> f32 {
-        let straight = self.normal[0].mul_add(other.normal[0], self.normal[1] * other.normal[1]);
-        let of = |body: usize| {
-            let BodyRow { velocity, delta } = &rows[self.rows[body] as usize];
-            velocity[3].mul_add(straight, delta[3] * self.arms[body][0] * other.arms[body][0])
-        };
-        of(1) + if self.pushes_a { of(0) } else { 0.0 }
     }
 
     /// Gap at the current positions (m).

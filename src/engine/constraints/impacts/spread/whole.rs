@@ -149,7 +149,6 @@ impl ImpactPropagation {
                 return true;
             }
             size = now;
-            if now > LARGEST && std::env::var_os("DBG").is_some() { eprintln!("too large {now}"); }
             if now > LARGEST || !self.solve(on) {
                 return false;
             }
@@ -241,7 +240,6 @@ impl ImpactPropagation {
             places.iter().for_each(|&place| self.meet(on, place));
         }
         for part in PARTS {
-            let t0 = std::time::Instant::now();
             let of = |i: usize| &self.points[places[i]];
             let all = 0..places.len();
             let rows = all.clone().map(|i| point_rows(of(i), i)).collect();
@@ -266,7 +264,6 @@ impl ImpactPropagation {
                     break;
                 }
             }
-            if std::env::var_os("DBG").is_some() { eprintln!("solve {} points {} blocks part {part} merit {:e} goal {:e} visits {} us {:?} movable {}", places.len(), self.joints.blocks.len(), island.merit, island.law.goal(&island.impulses), self.visits, t0.elapsed(), island.law.movable); }
             for (i, &place) in places.iter().enumerate() {
                 let normal = island.impulses[2 * i].max(0.0) as f32;
                 let bound = self.points[place].friction * normal;
@@ -290,7 +287,6 @@ impl ImpactPropagation {
                 return true;
             }
         }
-        if std::env::var_os("DBG").is_some() { eprintln!("undo"); }
         self.undo(on);
         false
     }

@@ -44,7 +44,7 @@
 //! bounded by the new normal impulses: the cone then holds, and sliding contacts use the current load.
 
 use crate::constraints::kernels::frame::{
-    BodyPair, DX, DY, INV_MASS, TURN, arms, separation, spin, to_frame, turn, with_arms,
+    BodyPair, DX, DY, TURN, arms, separation, spin, to_frame, turn, with_arms,
 };
 use crate::constraints::kernels::pass::{Pass, PassInput};
 use crate::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
@@ -168,36 +168,12 @@ where
         }
         let moved = to_frame::<L, O>([a[DX], a[DY]], [b[DX], b[DY]], [record[0], record[1]])[0];
         let ((sine_a, versine_a), (sine_b, versine_b)) = (turn(a[TURN]), turn(b[TURN]));
-        let mut unequal = L::zero();
-        if R::BY_MASS && pushes_a {
-            let more = a[INV_MASS] - b[INV_MASS];
-            unequal = more * more;
-            // Equal masses need no division.
-            if unequal.any_positive() {
-                let sum = a[INV_MASS] + b[INV_MASS];
-                let part = unequal / (sum * sum);
-                // The inert row has no mass.
-                unequal = sum.select_positive(part * part, L::zero());
-            }
-        }
         for p in 0..N::POINTS {
             let s = separation::<L, N, O>(record, p, moved, [sine_a, sine_b], [versine_a, versine_b]);
             let old = record[layout.at(p, layout.normal_impulse)];
             let mass = record[layout.at(p, layout.normal_mass)];
             let arm_n = arms::<L, N, O>(record, &layout, p, 0);
-            [begun.constant[p], begun.slope[p]] = if R::BY_MASS && unequal.any_positive() {
-                let weight = if has_friction {
-                    let arm_t = arms::<L, N, O>(record, &layout, p, 1);
-                    let [of_a, of_b] = [0, 1].map(|k| state.inertia[k] * arm_n[k] * arm_t[k]);
-                    let coupling = (of_a + of_b).max(-(of_a + of_b));
-                    unequal.min(self.rule.most_weight(record[layout.friction] * mass * coupling))
-                } else {
-                    unequal
-                };
-                self.rule.line_by_mass(weight, s, mass, old)
-            } else {
-                self.rule.line(!pushes_a, s, mass, old)
-            };
+            [begun.constant[p], begun.slope[p]] = self.rule.line(!pushes_a, s, mass, old);
             begun.velocity[p] = with_arms::<L, N, O>(along_n, state.w, arm_n);
             if has_friction && NORMAL_FIRST {
                 let arm_t = arms::<L, N, O>(record, &layout, p, 1);

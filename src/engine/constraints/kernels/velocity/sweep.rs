@@ -55,9 +55,6 @@ pub trait NormalRule: Copy + Send + Sync + 'static {
     /// Whether arms turn with their bodies within the step.
     const TURNED: bool = false;
 
-    /// Whether the rule has its own [`Self::line_by_mass`]. Only block sweeps use it.
-    const BY_MASS: bool = false;
-
     /// The rule for position errors of equality rows, such as those of joints.
     fn of_errors(&self) -> Softness {
         Softness::RIGID
@@ -68,19 +65,6 @@ pub trait NormalRule: Copy + Send + Sync + 'static {
     ///
     /// With a line, everything that does not depend on v_n is computed before v_n is known.
     fn line<L: Lanes>(&self, against_static: bool, separation: L, mass: L, old: L) -> [L; 2];
-
-    /// As [`Self::line`] between two moving bodies. The weight measures how unequal their masses are, from 0
-    /// to 1; see [`Between`](crate::constraints::kernels::velocity::rules::Between).
-    #[inline(always)]
-    fn line_by_mass<L: Lanes>(&self, _weight: L, separation: L, mass: L, old: L) -> [L; 2] {
-        self.line(false, separation, mass, old)
-    }
-
-    /// Largest weight for [`Self::line_by_mass`] of a point with q = µ |k_nt|/k_nn (1).
-    #[inline(always)]
-    fn most_weight<L: Lanes>(&self, _q: L) -> L {
-        L::splat(1.0)
-    }
 
     /// The slope s (kg) of a friction row, whose new impulse is λ − s v_t within the cone.
     #[inline(always)]

@@ -14,7 +14,7 @@ pub use baumgarte::Baumgarte;
 pub use rigid::Rigid;
 pub use soft::{Bearing, Soft, Softness, angular_frequencies};
 pub use touching::Touching;
-pub use variations::{Between, Frictionless, Relaxed, Turned};
+pub use variations::{Frictionless, Relaxed, Turned};
 
 use crate::constraints::kernels::velocity::sweep::{Sweep, VelocitySweep};
 
