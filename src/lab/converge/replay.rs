@@ -276,7 +276,7 @@ impl<'a> Replay<'a> {
         self.reset_joints(start);
         self.assign_lanes();
         self.work.kept = SolverState::default();
-        self.work.kept.follow(variant.kept, &self.contacts, self.bodies.len(), true);
+        self.work.kept.follow(variant.kept, &self.contacts, self.bodies.len());
         if start == Start::Warm && variant.kept != StateSize::default() {
             self.keep(variant);
             self.reset_joints(start);
@@ -304,10 +304,10 @@ impl<'a> Replay<'a> {
             self.scratch.clone_from(&self.contacts);
             for _ in 0..STEPS {
                 self.work.rows.clone_from(&self.rows_before);
-                self.work.kept.follow(variant.kept, &self.contacts, self.bodies.len(), false);
+                self.work.kept.follow(variant.kept, &self.contacts, self.bodies.len());
                 self.step(&input, &mut Clock::start(false));
             }
-            self.work.kept.follow(variant.kept, &self.contacts, self.bodies.len(), false);
+            self.work.kept.follow(variant.kept, &self.contacts, self.bodies.len());
             self.kept = Some((variant.name, self.work.kept.clone()));
             self.work.watch = watch;
         }

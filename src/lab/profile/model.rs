@@ -83,8 +83,8 @@ fn kernel(solver: &str, phase: Phase) -> Option<ContactKernel> {
     match (phase, solver) {
         (Phase::WarmStart, "tgs_soft") => None,
         (Phase::WarmStart, _) => Some(WarmStart),
-        (Phase::Solve, "shim" | "soft_block") => Some(SoftBlock),
-        (Phase::Relax, "shim" | "soft_block") => Some(RigidBlock),
+        (Phase::Solve, "shim") => Some(SoftBlock),
+        (Phase::Relax, "shim") => Some(RigidBlock),
         (
             Phase::Solve,
             "soft_step" | "pgs" | "pgs_soft" | "pgs_substeps" | "symmetric_gs" | "random_order",

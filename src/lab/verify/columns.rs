@@ -60,7 +60,7 @@ pub(super) static CASES: &[Case] = &[
         .by(|lab| stack(lab, 20).map(|found| found.finding(found.speed, REST))),
     Case::new("B5.height", "tallest stack that rests after 20 s (note: distance from the axis, m)", "boxes")
         .within("60 boxes have to stand")
-        .required("loads are fed forward, so a lean decays")
+        .required("frozen contacts keep their arms, so a lean does not grow")
         .by(|lab| {
             sweep("boxes", &[5.0, 10.0, 12.0, 14.0, 16.0, 20.0, 30.0, 40.0, 50.0, 60.0], |count| {
                 let found = stack(lab, count as u32)?;

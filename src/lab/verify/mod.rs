@@ -16,7 +16,7 @@
 //! # What is required
 //!
 //! Each row states whether the default solver ([`crate::engine::solvers::DEFAULT`]: soft contacts in
-//! substeps, shortened by the loads of statics) must pass, and which promise implies this or which promise is
+//! substeps, frozen at rest) must pass, and which promise implies this or which promise is
 //! missing. The exit code of `simpulse verify` depends on exactly the required cases. A required case that
 //! fails stays required.
 //!
@@ -24,7 +24,7 @@
 //! |---|---|
 //! | free motion follows its discrete formula exactly | semi-implicit Euler |
 //! | one body slides, sticks and rolls by Coulomb's law once contacts are warm-started | friction rows are rigid, solved last |
-//! | columns stand | loads of statics are fed forward for the positions of the current step, so a lean decays |
+//! | columns stand | contacts whose points bear load are frozen while nothing moves, so a lean does not grow |
 //! | overlap at rest is at most F/(m ω²) | the spring's fixed point, for any number of iterations |
 //! | a pile comes to rest if the Gauss–Seidel rate leaves no error within the run | cos²(π/2N) and R/(1+R) per sweep |
 //! | overlap is pushed apart at 3 m/s at most | the push speed is limited |
@@ -40,19 +40,17 @@
 //! Not promised:
 //!
 //! - A unique solution before the sweeps of a step have converged.
-//! - Heavy loads on light bodies before the loads are known: the depth F/(m ω²) itself may exceed the size of
-//!   the body.
+//! - Heavy loads on light bodies: the depth F/(m ω²) itself may exceed the size of the body.
 //! - **High stacks of soft contacts.** A contact between unit boxes has the effective mass 1/5 kg at each
 //!   corner. Its stiffness is k = ω²/5 = 7106 N/m at 30 Hz, and K = 2 k (½)² = 3553 N m/rad against rotation.
 //!   A column of N links of 1 m with such joints and a weight of q = 10 N/m buckles like Greenhill's beam, at
-//!   q N³ = 7.837 K: N = 14.1, and N ∝ f^⅔. More iterations do not help; the loads that the default solver
-//!   feeds forward do (`papers/shim.md`).
+//!   q N³ = 7.837 K: N = 14.1, and N ∝ f^⅔. More iterations do not help; frozen contacts do (`papers/frozen.md`).
 //! - **Friction in the first substep.** A box on a slope has its contact points ½ m below its center: k = 1 +
 //!   (½)²·6 = 2.5, so the impulse that stops the points is 1/2.5 of the one that stops the box. The rest
 //!   rotates the box. Two sweeps with friction leave a speed of up to 0.6² g h sin θ once. If µ exceeds tan θ
 //!   only slightly, friction takes long to stop it.
-//! - **Plastic impacts of many bodies.** If an impact needs more visits than its bound, sweeps do the rest:
-//!   two in each substep, starting from the impulses of the previous substep.
+//! - **Plastic impacts of many bodies.** If an impact needs more visits than its bound, and has too many
+//!   points to be solved as a whole, sweeps do the rest: two in each substep, starting from the impulses of the previous one.
 //! - **Rotating frames.** Within a step, bodies move along tangents and contacts keep their normals, so a
 //!   body on a turntable creeps outward (A26.turntable). Round contacts roll without lag under `shim` only.
 //! - **Sudden loads.** The first substep starts from the impulses of the previous step, even if their load

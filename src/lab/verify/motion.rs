@@ -31,7 +31,7 @@ pub(super) static CASES: &[Case] = &[
     // relative error of the distance compared with the discrete formula, for steps from 1/15 s to 1/1000 s.
     Case::new("B14.large", "largest step at which a box slides and a disc rolls to 1 % down an incline", "s")
         .within("1/15 s has to hold")
-        .required("the first substep starts from the loads of statics")
+        .not_required("the first substep starts without impulses")
         .by(|lab| {
             let steps = [1.0 / 1000.0, 1.0 / 240.0, 1.0 / 120.0, 1.0 / 60.0, 1.0 / 30.0, 1.0 / 15.0];
             sweep("dt (s)", &steps, |dt| {

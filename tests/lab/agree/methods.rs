@@ -172,7 +172,7 @@ pub fn against(solver: &str) -> Option<Against> {
         "xpbd" => Method(xpbd),
         "avbd" => Method(avbd),
         "soft_step" => Method(|m, r| soft(m, r, 0.125, false)),
-        "soft_block" | "shim" => Method(stiff_blocks),
+        "shim" => Method(stiff_blocks),
         "box2d" => Method(|m, r| without_first_friction(m, r, RowOrder::NormalsFirst)),
         "rapier" => Method(|m, r| {
             without_first_friction(m, r, RowOrder::BlockFirst(if r.undoes(0) { 1e-2 } else { 1e-3 }))
@@ -346,7 +346,7 @@ fn without_first_friction(model: &mut Model, run: &Run, rows: RowOrder) {
     relaxed(model, run, soft, ScalarSweep { rows, ..ScalarSweep::new(ScalarRule::Rigid) });
 }
 
-/// Springs at a share of the substep rate, and blocks: `soft_block` and `shim` without [`super::WITHOUT`].
+/// Springs at a share of the substep rate, and blocks: `shim` without [`super::WITHOUT`].
 fn stiff_blocks(model: &mut Model, run: &Run) {
     let rate = run.get("stiffness") / model.h;
     let spring = ScalarSpring {

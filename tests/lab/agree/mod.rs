@@ -58,8 +58,8 @@ fn most(solver: &str) -> u32 {
 /// by 6·10⁻⁸, and in the worst case the errors add up.
 const ROUNDING: f64 = 6e-5;
 
-/// Mechanisms of `shim` and `soft_block` that are left out in the comparison.
-const WITHOUT: [&str; 4] = ["statics", "frames", "impacts", "jams"];
+/// Mechanisms of `shim` that are left out in the comparison.
+const WITHOUT: [&str; 3] = ["frames", "impacts", "jams"];
 
 /// The cells of a solver in sources.md: its source at its best, departures that the method in `f64` can undo,
 /// of which [`Run::undo`] is the index, and why the solution is compared, if it is.
