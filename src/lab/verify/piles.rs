@@ -56,7 +56,9 @@ pub(super) static CASES: &[Case] = &[
         }),
     Case::new("B9.speed", "upward speed after the heavy third disc is removed", "m/s")
         .within("0.05 m/s")
-        .not_required("a sagging contact stores the energy F²/2k, which it gives back when its load is removed")
+        .not_required(
+            "a sagging contact stores the energy F²/2k, which it gives back when its load is removed",
+        )
         .by(|lab| Ok(Finding::new(released(lab)?[0], 0.0, 0.05))),
     Case::new("B9.gap", "gap that opens then", "m")
         .within("the slop")
@@ -129,7 +131,9 @@ pub(super) static CASES: &[Case] = &[
         }),
     Case::new("B25.off", "largest speed in twenty boxes in 5 s after gravity is turned off", "m/s")
         .within("0.05 m/s, as for B9")
-        .not_required("a sagging contact stores the energy F²/2k, which it gives back when its load is removed")
+        .not_required(
+            "a sagging contact stores the energy F²/2k, which it gives back when its load is removed",
+        )
         .by(|lab| {
             let mut world = rested(lab)?;
             world.settings.gravity = [0.0; 2];

@@ -16,7 +16,7 @@ const PIVOTS: usize = 10;
 /// Solves of a linear problem: one, and two refinements on the residual.
 const PASSES: usize = 3;
 /// Residual, relative to the largest impulse, at which the law is solved.
-const TOLERANCE: f64 = 1e-10;
+pub(crate) const TOLERANCE: f64 = 1e-10;
 
 /// State of a row in a linear problem.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -472,9 +472,13 @@ impl IslandLaw {
                 let shift = if r == c { SHIFT } else { 0.0 };
                 group.softness[r][c] = shift + members[r].scale * entry * members[c].scale;
             }
-            let mut padded = group.softness;
-            (size..3).for_each(|k| padded[k][k] = 1.0);
-            group.inverse = inverse(padded)?;
+            if size == 1 {
+                group.inverse[0][0] = 1.0 / group.softness[0][0];
+            } else {
+                let mut padded = group.softness;
+                (size..3).for_each(|k| padded[k][k] = 1.0);
+                group.inverse = inverse(padded)?;
+            }
             first += size;
             groups.push(group);
         }

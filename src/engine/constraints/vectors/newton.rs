@@ -1,6 +1,6 @@
 //! Newton's method on the contact law of an island, see [`super::law`].
 
-use super::law::IslandLaw;
+use super::law::{IslandLaw, TOLERANCE};
 use crate::constraints::numerics::block_lu::BlockLu;
 use crate::lanes::BodyRow;
 use std::ops::Range;
@@ -68,6 +68,19 @@ impl Island {
         self.stalls += usize::from(self.merit > 0.5 * before);
         self.done |= !found;
         found
+    }
+
+    /// At most this many Newton steps. Returns whether the residual is below this fraction of the impulses.
+    pub fn solve(&mut self, steps: usize, tolerance: f64) -> bool {
+        let is_below = |island: &Self, part: f64| {
+            island.merit <= (part / TOLERANCE).powi(2) * island.law.goal(&island.impulses)
+        };
+        for _ in 0..steps {
+            if is_below(self, 1e-3 * tolerance) || !self.search() {
+                break;
+            }
+        }
+        is_below(self, tolerance)
     }
 
     /// A Newton step, halved until the residual falls.

@@ -107,9 +107,11 @@ pub struct ImpactPropagation {
     first: usize,
     /// When its first points, those that were hit from outside, close their gaps (s).
     arrivals: Vec<f32>,
-    /// Number of visits to points of the island.
+    /// Number of visits to points of the island, and of solutions of its waves.
     visits: usize,
-    /// Approach speed below which a point counts as solved (m/s).
+    solutions: u32,
+    /// Approach speed of the impact, and that below which a point counts as solved (m/s).
+    fastest: f32,
     slowest: f32,
 }
 
@@ -157,7 +159,7 @@ impl ImpactPropagation {
 
     /// Solves the impacts of an island. Returns false if it reached its bound.
     fn island(&mut self, on: &mut PropagationInput<'_>, hit: std::ops::Range<usize>) -> bool {
-        (self.first, self.visits) = (self.points.len(), 0);
+        (self.first, self.visits, self.solutions) = (self.points.len(), 0, 0);
         self.pushed.clear();
         self.joints.clear();
         for i in hit {
@@ -169,7 +171,8 @@ impl ImpactPropagation {
             let bounces = wave + WAVES[1] < WAVES[0];
             if wave == 0 {
                 let speeds = self.points[self.first..].iter().map(|p| -p.velocity(on.rows)[0]);
-                self.slowest = TOLERANCE * speeds.fold(0.0, f32::max);
+                self.fastest = speeds.fold(0.0, f32::max);
+                self.slowest = TOLERANCE * self.fastest;
             }
             let any = self.begin_wave(on, wave == 0, bounces);
             if wave == 0 && self.points[self.first..].iter().any(|point| point.role == Role::Bounces) {
@@ -260,7 +263,8 @@ impl ImpactPropagation {
                 self.visit(on, first + 1, bounces);
             }
             let points = self.points.len() - self.first;
-            is_done = !self.joints.act() && self.visits <= on.visits * points.min(FIRST) + points.saturating_sub(FIRST);
+            is_done = !self.joints.act()
+                && self.visits <= on.visits * points.min(FIRST) + points.saturating_sub(FIRST);
         }
         is_done && !self.joints.act()
     }

@@ -24,7 +24,8 @@ pub(super) struct Body {
 }
 
 /// A body that nothing has pushed.
-pub(super) const STILL: Body = Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false, is_pushed: false };
+pub(super) const STILL: Body =
+    Body { first: NONE, time: f32::NEG_INFINITY, is_queued: false, is_pushed: false };
 
 /// Role of a point in a wave.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

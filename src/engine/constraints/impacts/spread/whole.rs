@@ -9,10 +9,12 @@
 //! They hardly ever change the result, but save a solution for each layer of a wall that lands.
 //!
 //! **Energy.** With e = 0 the law takes energy. With different e, or with friction, Newton's law may create some (Kane's paradox).
-//! So if the bodies of the impact have more energy than before it, and than forces give them in a step, rebounds are
-//! halved, and then left out. If that is too much still, the impact is undone and left to the sweeps.
+//! So if the impulses do more work on the bodies than forces do in a step, rebounds are halved, and then left out. If that
+//! is too much still, the impact is undone and left to the sweeps.
 //!
-//! **Bound.** [`LARGEST`] points and pairs of joint rows. Each round adds one of them, so it ends.
+//! Where a piston leaves bodies no room there is no solution, or one in which they are thrown out sideways. It is undone as well.
+//!
+//! **Bound.** [`LARGEST`] points and pairs of joint rows, and [`SOLUTIONS`] for an island.
 
 use super::point::{HitPoint, PropagationInput, Role, STILL};
 use super::{ImpactPropagation, NONE};
@@ -25,7 +27,10 @@ use crate::constraints::vectors::system::PointRows;
 use crate::lanes::BodyRow;
 
 /// Most points and pairs of joint rows.
-const LARGEST: usize = 256;
+const LARGEST: usize = 64;
+
+/// Most solutions of an island.
+const SOLUTIONS: u32 = 4;
 
 /// Bodies between what is pushed and a resting contact that joins the problem.
 const LAYERS: usize = 4;
@@ -33,8 +38,12 @@ const LAYERS: usize = 4;
 /// Gap of a resting contact, as a fraction of the slop (1).
 const CLOSED: f32 = 0.1;
 
-/// Most steps of Newton's method.
-const STEPS: usize = 24;
+/// Most steps of Newton's method, and the residual that it has to reach, as a fraction of the impulses (1).
+const STEPS: usize = 10;
+const RESIDUAL: f64 = 1e-4;
+
+/// Speed at which points of a solution may still approach, as a fraction of that of the impact (1).
+const STILL_CLOSES: f32 = 0.01;
 
 /// Parts of the rebounds that are tried.
 const PARTS: [f32; 3] = [1.0, 0.5, 0.0];
@@ -79,11 +88,7 @@ impl WaveJoints {
                 for body in pair {
                     let end = next.len() as u32;
                     let moves = rows[body as usize].velocity[3] > 0.0;
-                    next.push(if moves {
-                        std::mem::replace(&mut first[body as usize], end)
-                    } else {
-                        NONE
-                    });
+                    next.push(if moves { std::mem::replace(&mut first[body as usize], end) } else { NONE });
                 }
             }
         }
@@ -149,7 +154,8 @@ impl ImpactPropagation {
                 return true;
             }
             size = now;
-            if now > LARGEST || !self.solve(on) {
+            self.solutions += 1;
+            if now > LARGEST || self.solutions > SOLUTIONS || !self.solve(on) {
                 return false;
             }
         }
@@ -248,7 +254,8 @@ impl ImpactPropagation {
                 .clone()
                 .map(|i| {
                     let ([vn, vt], point) = (of(i).velocity(on.rows), of(i));
-                    let gap = if timed || point.role == Role::Bounces { 0.0 } else { point.gap(on.rows).max(0.0) };
+                    let gap =
+                        if timed || point.role == Role::Bounces { 0.0 } else { point.gap(on.rows).max(0.0) };
                     [part.mul_add(-point.target, vn) + gap / on.dt, vt]
                 })
                 .collect();
@@ -258,11 +265,9 @@ impl ImpactPropagation {
                 law.join(on.rows, block, 0.0, on.dt);
             }
             let mut island = Island::new(law);
-            for _ in 0..STEPS {
-                self.visits += places.len();
-                if !island.step() {
-                    break;
-                }
+            self.visits += places.len();
+            if !island.solve(STEPS, RESIDUAL) {
+                break;
             }
             for (i, &place) in places.iter().enumerate() {
                 let normal = island.impulses[2 * i].max(0.0) as f32;
@@ -284,6 +289,9 @@ impl ImpactPropagation {
                 (0..3).for_each(|k| delta[k] = time * (before[k] - velocity[k]));
             }
             if !self.gains_energy(on) {
+                if self.is_squeezed(on, &places, part) {
+                    break;
+                }
                 return true;
             }
         }
@@ -335,21 +343,41 @@ impl ImpactPropagation {
         self.enqueue(row);
     }
 
-    /// Whether pushed bodies have more energy than before, and than forces give them in a step.
-    fn gains_energy(&self, on: &PropagationInput<'_>) -> bool {
-        let (mut gain, mut given) = (0.0_f64, 0.0_f64);
-        for &(row, before) in &self.pushed {
-            let BodyRow { velocity, delta } = on.rows[row as usize];
-            let [x, y, turn, _] = on.increments[row as usize];
-            let mass = |inverse: f32| if inverse > 0.0 { 1.0 / f64::from(inverse) } else { 0.0 };
-            let forces = [x, y, turn].map(|per_substep| f64::from(per_substep * on.dt / on.h));
-            for (k, mass) in [mass(velocity[3]), mass(velocity[3]), mass(delta[3])].into_iter().enumerate() {
-                let [old, new] = [before[k], velocity[k]].map(f64::from);
-                gain += 0.5 * mass * (new * new - old * old);
-                given += mass * (forces[k] * new).abs().max((forces[k] * old).abs());
+    /// Whether points still approach, or bodies that move on given paths have thrown others faster than twice their own speed:
+    /// bodies without room.
+    fn is_squeezed(&self, on: &PropagationInput<'_>, places: &[usize], part: f32) -> bool {
+        let length = |[x, y]: [f32; 2]| x.mul_add(x, y * y).sqrt();
+        let of = |row: u32| on.rows[row as usize].velocity;
+        let before = self.pushed.iter().fold(0.0_f32, |most, (_, [x, y, _])| most.max(length([*x, *y])));
+        let (mut driver, mut approach) = (0.0_f32, 0.0_f32);
+        for point in places.iter().map(|&place| &self.points[place]) {
+            let [x, y, spin, _] = of(point.rows[0]);
+            if !point.pushes_a {
+                driver = driver.max(length([x, y]) + spin.abs() * length(point.arms[0]));
+            }
+            approach = approach.max(part * point.target - point.velocity(on.rows)[0]);
+        }
+        let after =
+            self.pushed.iter().fold(0.0_f32, |most, &(row, _)| most.max(length([of(row)[0], of(row)[1]])));
+        approach > STILL_CLOSES * self.fastest || driver > 0.0 && after > 2.0 * before.max(driver)
+    }
+
+    /// Whether the impulses of the island have done work on its bodies, more than forces do in a step: N and T at the
+    /// mean of the relative velocities before and after. So bodies that move on given paths may push.
+    fn gains_energy(&mut self, on: &mut PropagationInput<'_>) -> bool {
+        let (mut work, mut allowed) = (0.0, 0.0);
+        for _ in 0..2 {
+            for point in self.points[self.first..].iter().filter(|point| point.exists) {
+                let ([n, t], [vn, vt]) = (point.given, point.velocity(on.rows));
+                work += 0.5 * f64::from(n.mul_add(vn, t * vt));
+                allowed += 0.5 * f64::from(n * point.slow);
+            }
+            // The velocities before the impact, and those after it again.
+            for (row, other) in &mut self.pushed {
+                on.rows[*row as usize].velocity[..3].swap_with_slice(other);
             }
         }
-        gain > given
+        work > allowed
     }
 
     /// Takes back all impulses of the island.
