@@ -70,13 +70,13 @@ impl Island {
         found
     }
 
-    /// At most this many Newton steps. Returns whether the residual is below this fraction of the impulses.
+    /// At most this many Newton steps, or sweeps where these do not improve. Returns whether the residual is below this fraction of the impulses.
     pub fn solve(&mut self, steps: usize, tolerance: f64) -> bool {
         let is_below = |island: &Self, part: f64| {
             island.merit <= (part / TOLERANCE).powi(2) * island.law.goal(&island.impulses)
         };
         for _ in 0..steps {
-            if is_below(self, 1e-3 * tolerance) || !self.search() {
+            if is_below(self, 1e-3 * tolerance) || !(self.search() || self.sweep()) {
                 break;
             }
         }

@@ -27,19 +27,19 @@ use crate::constraints::vectors::system::PointRows;
 use crate::lanes::BodyRow;
 
 /// Most points and pairs of joint rows.
-const LARGEST: usize = 64;
+const LARGEST: usize = 80;
 
 /// Most solutions of an island.
-const SOLUTIONS: u32 = 4;
+const SOLUTIONS: u32 = 3;
 
 /// Bodies between what is pushed and a resting contact that joins the problem.
-const LAYERS: usize = 4;
+const LAYERS: usize = 32;
 
 /// Gap of a resting contact, as a fraction of the slop (1).
 const CLOSED: f32 = 0.1;
 
 /// Most steps of Newton's method, and the residual that it has to reach, as a fraction of the impulses (1).
-const STEPS: usize = 10;
+const STEPS: usize = 16;
 const RESIDUAL: f64 = 1e-4;
 
 /// Speed at which points of a solution may still approach, as a fraction of that of the impact (1).
