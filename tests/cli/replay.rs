@@ -28,7 +28,7 @@ fn a_picture_shows_a_frame() {
     }
     // All pictures have the same scale: micrometers are invisible unless a scale of micrometers is requested.
     let colors = |options: &str| {
-        succeeds(path, &format!("run stack:2 --without statics --picture c.svg {options}"));
+        succeeds(path, &format!("run stack:2 --without frames --picture c.svg {options}"));
         let text = std::fs::read_to_string(path.join("c.svg")).unwrap();
         let bodies = text.lines().filter(|line| line.contains("<title>body"));
         let fill = |line: &str| Some(line.split_once("fill=\"")?.1[..7].to_string());

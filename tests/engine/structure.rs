@@ -43,7 +43,7 @@ const ENGINE: &[&[&str]] = &[
     &["world"],
 ];
 const CONSTRAINTS: &[&[&str]] =
-    &[&["numerics"], &["records"], &["kernels"], &["joints", "vectors", "impacts"], &["step"]];
+    &[&["numerics"], &["records"], &["kernels"], &["joints", "vectors"], &["impacts"], &["step"]];
 const LAB: &[&[&str]] = &[
     &["error"],
     &["files", "interned", "memory", "overrides", "parallel", "units"],

@@ -10,14 +10,14 @@
 //!
 //! **Energy.** With e = 0 the law takes energy. With different e, or with friction, Newton's law may create some (Kane's paradox).
 //! So if the impulses do more work on the bodies than forces do in a step, rebounds are halved, and then left out. If that
-//! is too much still, the impact is undone and left to the sweeps.
+//! is too much still, what visits have found remains.
 //!
-//! Where a piston leaves bodies no room there is no solution, or one in which they are thrown out sideways. It is undone as well.
+//! Where a piston leaves bodies no room there is no solution, or one in which they are thrown out sideways. Then what visits have found remains as well.
 //!
 //! **Bound.** [`LARGEST`] points and pairs of joint rows, and [`SOLUTIONS`] for an island.
 
 use super::point::{HitPoint, PropagationInput, Role, STILL};
-use super::{ImpactPropagation, NONE};
+use super::{BOUNCES, ImpactPropagation, NONE};
 use crate::constraints::kernels::types::{BodyStates, ConstraintSet};
 use crate::constraints::numerics::cone;
 use crate::constraints::records::rows::{RowBlock, RowLaw};
@@ -125,19 +125,42 @@ impl WaveJoints {
 }
 
 impl ImpactPropagation {
-    /// Solves the wave at once, the first one from the velocities before it. Returns false if it is too large, or would create energy.
+    /// Solves the wave at once, the first one from the velocities before it. If it is too large or has no solution, returns false
+    /// and leaves what visits have found.
     pub(super) fn whole(&mut self, on: &mut PropagationInput<'_>, is_first: bool, bounces: bool) -> bool {
-        let points = |all: &[HitPoint]| all.iter().filter(|point| takes_part(point)).count();
-        if points(&self.points[self.first..]) > LARGEST {
+        if self.size() > LARGEST {
             return false;
         }
+        let (points, pushed) = (self.points[self.first..].to_vec(), self.pushed.len());
+        let rows: Vec<BodyRow> = self.pushed.iter().map(|&(row, _)| on.rows[row as usize]).collect();
         if is_first {
             self.undo(on);
             for point in &mut self.points[self.first + self.arrivals.len()..] {
                 point.role = Role::Open;
             }
         }
-        let mut size = 0;
+        let is_solved = self.rounds(on, bounces);
+        self.empty_queue();
+        if !is_solved {
+            self.undo(on);
+            for (&(row, _), state) in self.pushed[..pushed].iter().zip(rows) {
+                on.rows[row as usize] = state;
+            }
+            let (old, new) = self.points[self.first..].split_at_mut(points.len());
+            old.copy_from_slice(&points);
+            new.iter_mut().for_each(|point| point.role = Role::Open);
+        }
+        is_solved
+    }
+
+    /// Number of points and pairs of joint rows that take part.
+    fn size(&self) -> usize {
+        let rows = self.joints.blocks.iter().map(|block| block.size).sum::<usize>();
+        self.points[self.first..].iter().filter(|point| takes_part(point)).count() + rows.div_ceil(2)
+    }
+
+    /// Solves the wave, and again with what its bodies then approach. Returns whether nothing is left to add.
+    fn rounds(&mut self, on: &mut PropagationInput<'_>, bounces: bool) -> bool {
         for row in 0..self.pushed.len() {
             self.enqueue(self.pushed[row].0);
         }
@@ -146,10 +169,10 @@ impl ImpactPropagation {
                 self.enqueue_ends(place);
             }
         }
+        let mut size = 0;
         loop {
             self.gather(on, bounces);
-            let now = points(&self.points[self.first..])
-                + self.joints.blocks.iter().map(|block| block.size).sum::<usize>().div_ceil(2);
+            let now = self.size();
             if now == size {
                 return true;
             }
@@ -199,6 +222,11 @@ impl ImpactPropagation {
                 }
             }
         }
+        self.empty_queue();
+    }
+
+    /// Forgets the bodies that are queued.
+    fn empty_queue(&mut self) {
         while let Some(row) = self.queue.pop_front() {
             self.bodies[row as usize].is_queued = false;
         }
@@ -207,7 +235,8 @@ impl ImpactPropagation {
     /// Adds a point that rests and does not bounce. Returns whether it is one.
     fn add_resting(&mut self, on: &PropagationInput<'_>, place: usize) -> bool {
         let point = &mut self.points[place];
-        let rests = point.exists && on.restitution(point) == 0.0 && point.gap(on.rows) < CLOSED * on.slop;
+        let bounces = on.restitution(point) * self.fastest > BOUNCES * point.slow;
+        let rests = point.exists && !bounces && point.gap(on.rows) < CLOSED * on.slop;
         if rests {
             point.stop();
         }
@@ -295,7 +324,6 @@ impl ImpactPropagation {
                 return true;
             }
         }
-        self.undo(on);
         false
     }
 
