@@ -42,6 +42,9 @@ const CLOSED: f32 = 0.1;
 const STEPS: usize = 16;
 const RESIDUAL: f64 = 1e-4;
 
+/// Work that is rounding, as a fraction of what points take or give (1): with e = 1 both are equal.
+const ROUNDING: f32 = 1e-4;
+
 /// Speed at which points of a solution may still approach, as a fraction of that of the impact (1).
 const STILL_CLOSES: f32 = 0.01;
 
@@ -139,7 +142,7 @@ impl ImpactPropagation {
                 point.role = Role::Open;
             }
         }
-        let is_solved = self.rounds(on, bounces);
+        let is_solved = self.rounds(on, is_first, bounces);
         self.empty_queue();
         if !is_solved {
             self.undo(on);
@@ -160,7 +163,7 @@ impl ImpactPropagation {
     }
 
     /// Solves the wave, and again with what its bodies then approach. Returns whether nothing is left to add.
-    fn rounds(&mut self, on: &mut PropagationInput<'_>, bounces: bool) -> bool {
+    fn rounds(&mut self, on: &mut PropagationInput<'_>, is_first: bool, bounces: bool) -> bool {
         for row in 0..self.pushed.len() {
             self.enqueue(self.pushed[row].0);
         }
@@ -178,7 +181,7 @@ impl ImpactPropagation {
             }
             size = now;
             self.solutions += 1;
-            if now > LARGEST || self.solutions > SOLUTIONS || !self.solve(on) {
+            if now > LARGEST || self.solutions > SOLUTIONS || !self.solve(on, is_first) {
                 return false;
             }
         }
@@ -238,6 +241,8 @@ impl ImpactPropagation {
         let bounces = on.restitution(point) * self.fastest > BOUNCES * point.slow;
         let rests = point.exists && !bounces && point.gap(on.rows) < CLOSED * on.slop;
         if rests {
+            // That of its bodies, once they are hit.
+            point.time = -on.dt;
             point.stop();
         }
         rests
@@ -266,12 +271,19 @@ impl ImpactPropagation {
     }
 
     /// Solves the problem of all points and joints that take part. Returns false, and undoes the impact, if it creates energy.
-    fn solve(&mut self, on: &mut PropagationInput<'_>) -> bool {
+    fn solve(&mut self, on: &mut PropagationInput<'_>, is_first: bool) -> bool {
         let places: Vec<usize> =
             (self.first..self.points.len()).filter(|&place| takes_part(&self.points[place])).collect();
         let timed = on.timed && self.joints.blocks.is_empty();
-        if timed {
+        // Bodies that bounce have a time for each of their impulses.
+        let shared = is_first && places.iter().all(|&place| self.points[place].role == Role::Stops);
+        if timed && shared {
             self.share_times(on, &places);
+        } else if is_first {
+            let hit = &mut self.points[self.first..];
+            hit.iter_mut().zip(&self.arrivals).for_each(|(point, &arrival)| point.time = arrival);
+        }
+        if timed {
             places.iter().for_each(|&place| self.meet(on, place));
         }
         for part in PARTS {
@@ -311,11 +323,12 @@ impl ImpactPropagation {
                 island.push(first..first + block.size, &mut block.impulses, on.rows);
                 first += block.size;
             }
-            for &(row, before) in &self.pushed {
-                let (BodyRow { velocity, delta }, time) =
-                    (&mut on.rows[row as usize], self.bodies[row as usize].time);
-                let time = if timed { time.max(-on.dt) } else { 0.0 };
-                (0..3).for_each(|k| delta[k] = time * (before[k] - velocity[k]));
+            if !timed || shared {
+                for &(row, before) in &self.pushed {
+                    let time = if timed { self.bodies[row as usize].time.max(-on.dt) } else { 0.0 };
+                    let BodyRow { velocity, delta } = &mut on.rows[row as usize];
+                    (0..3).for_each(|k| delta[k] = time * (before[k] - velocity[k]));
+                }
             }
             if !self.gains_energy(on) {
                 if self.is_squeezed(on, &places, part) {
@@ -398,7 +411,7 @@ impl ImpactPropagation {
             for point in self.points[self.first..].iter().filter(|point| point.exists) {
                 let ([n, t], [vn, vt]) = (point.given, point.velocity(on.rows));
                 work += 0.5 * f64::from(n.mul_add(vn, t * vt));
-                allowed += 0.5 * f64::from(n * point.slow);
+                allowed += 0.5 * f64::from(n * ROUNDING.mul_add(vn.abs(), point.slow));
             }
             // The velocities before the impact, and those after it again.
             for (row, other) in &mut self.pushed {
