@@ -177,7 +177,8 @@ fn what_lands_without_restitution_stays_down() {
 /// A box of many times the mass falls by two meters on one box, or on ten.
 #[test]
 fn a_heavy_box_does_not_bounce_on_light_ones() {
-    for (count, ratio) in [(1, 10.0), (1, 30.0), (1, 100.0), (1, 300.0), (10, 10.0), (10, 30.0), (10, 100.0)] {
+    for (count, ratio) in [(1, 10.0), (1, 30.0), (1, 100.0), (1, 300.0), (10, 10.0), (10, 30.0), (10, 100.0)]
+    {
         let pile = (0..count).map(|i| boxed(0.0, 0.5 + f64::from(i), 1.0));
         let speed = rebound(pile.chain([boxed(0.0, f64::from(count) + 2.5, ratio)]).collect());
         assert!(speed < OF_A_STEP, "{ratio} : 1 on {count}: {speed} m/s");

@@ -17,6 +17,7 @@
 //! touch is not known.
 
 use crate::constraints::kernels::frame::turn;
+use crate::constraints::records::features::Layout;
 use crate::contacts::{Contact, Manifold};
 use crate::lanes::BodyRow;
 use crate::narrowphase::circles::arrival;
@@ -111,6 +112,17 @@ fn straight(row: &BodyRow) -> Vec2 {
     Vec2::new(row.velocity[0], row.velocity[1])
 }
 
+impl TouchFrame {
+    /// Replaces the frame in the record of its lane, by `put(vector, value)`.
+    pub fn write_record(&self, layout: &Layout, rows: [&BodyRow; 2], mut put: impl FnMut(usize, f32)) {
+        let [k_nn, k_tt, _] = couplings(rows, self.arms);
+        put(0, self.normal.x);
+        put(1, self.normal.y);
+        put(layout.at(0, layout.separation), self.separation);
+        write_arms(layout, 0, self.arms, [1.0 / k_nn, 1.0 / k_tt], put);
+    }
+}
+
 /// k_nn, k_tt and k_nt of a row between two bodies with these arms (1/kg).
 pub(crate) fn couplings([a, b]: [&BodyRow; 2], arms: [[f32; 2]; 2]) -> [f32; 3] {
     let direct = a.velocity[3] + b.velocity[3];
@@ -119,4 +131,25 @@ pub(crate) fn couplings([a, b]: [&BodyRow; 2], arms: [[f32; 2]; 2]) -> [f32; 3] 
         of(a, arms[0]) + of(b, arms[1])
     };
     [direct + turns(0, 0), direct + turns(1, 1), turns(0, 1)]
+}
+
+/// Writes arms (m) and the effective masses 1/k_nn and 1/k_tt (kg) of point `p` into a record, by `put(vector, value)`.
+pub(crate) fn write_arms(
+    layout: &Layout,
+    p: usize,
+    arms: [[f32; 2]; 2],
+    [normal_mass, tangent_mass]: [f32; 2],
+    mut put: impl FnMut(usize, f32),
+) {
+    let ends = [(layout.arm_a, layout.has_arms[1]), (layout.arm_b, layout.has_arms[0])];
+    for ((first, has), [n, t]) in ends.into_iter().zip(arms) {
+        if has {
+            put(layout.at(p, first), n);
+            put(layout.at(p, first) + 1, t);
+        }
+    }
+    put(layout.at(p, layout.normal_mass), normal_mass);
+    if layout.has_friction {
+        put(layout.at(p, layout.tangent_mass), tangent_mass);
+    }
 }

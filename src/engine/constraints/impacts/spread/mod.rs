@@ -12,7 +12,10 @@
 //! the limit of a small one.
 //!
 //! After a body is pushed, its other points are visited, until no approach is faster than 10⁻³ of the first.
-//! Bodies that nothing hits cost nothing. A wave that visits do not solve is solved as a whole ([`whole`]).
+//! Bodies that nothing hits cost nothing. Visiting the two points of a contact in turn leaves a fraction
+//! c²/(k₀ k₁) of the error, with c the velocity that a unit impulse at one adds to the other. If the fraction
+//! is more than half, as for corners that just overlap, both normal impulses are solved together ([`pair`]).
+//! A wave that visits do not solve is solved as a whole, if it only stops, and so is one in which joints take part ([`whole`]).
 //!
 //! # Time of the impact within the step
 //!
@@ -31,18 +34,21 @@
 //!
 //! At the time of the impulse the centers have moved relative to each other by D. With the arms of the start
 //! of the step the impulse would add D × λ to the angular momentum. So both arms end at one point at that
-//! time, r_a + D/2 and r_b − D/2, and round shapes have the frame of that time (`touch.rs`).
-//! Impacts write the velocities and displacements of bodies and nothing else.
+//! time, r_a + D/2 and r_b − D/2, and round shapes have the frame of that time (`touch.rs`). The rows
+//! themselves use these arms and frames: an impulse with an effect that its row leaves out may add energy,
+//! and has shot bodies out of piles.
 //!
 //! # A bound for each island
 //!
 //! Bodies connected by contacts form an island. Islands are solved independently, so a scene behaves the same
 //! next to another one. An island has at most 32 waves, of which the last 4 only stop, and a visit limit that
 //! grows with its number of points ([`VISITS`]). The solver stops points that still approach after that.
-//! So the time of a step is bounded.
+//! Bodies of such an island that would end deeper in another body than they began are not moved. So the time
+//! of a step is bounded.
 
 mod find;
 mod law;
+mod pair;
 mod point;
 mod whole;
 
@@ -79,6 +85,10 @@ pub(crate) const VISITS: usize = 18;
 
 /// Number of points to which [`VISITS`] applies.
 const FIRST: usize = 8;
+
+/// How much deeper a point of an island that reached its bound may end, as a fraction of the slop (1): the
+/// residual approach of touching bodies makes them overlap.
+const DEEPER: f32 = 0.1;
 
 /// Solves impacts; keeps its memory from step to step.
 #[derive(Clone, Debug, Default)]
@@ -148,6 +158,7 @@ impl ImpactPropagation {
             begin = end;
         }
         for point in self.points.iter().filter(|point| point.given != [0.0; 2]) {
+            on.put(point);
             if on.record_impulses {
                 let contact = on.contact_of(point.lane);
                 let sum = &mut on.contacts[contact].step_impulse[usize::from(point.index)];
@@ -173,6 +184,9 @@ impl ImpactPropagation {
                 let speeds = self.points[self.first..].iter().map(|p| -p.velocity(on.rows)[0]);
                 self.fastest = speeds.fold(0.0, f32::max);
                 self.slowest = TOLERANCE * self.fastest;
+                let points = &self.points[self.first..];
+                self.arrivals.clear();
+                self.arrivals.extend(points.iter().map(|point| arrival(point, on, 0.0).unwrap_or(-on.dt)));
             }
             let any = self.begin_wave(on, wave == 0, bounces);
             if wave == 0 && self.points[self.first..].iter().any(|point| point.role == Role::Bounces) {
@@ -183,14 +197,6 @@ impl ImpactPropagation {
                 break;
             }
             let known = if wave == 0 { arrived } else { self.points.len() };
-            // All of them at the velocities before the wave.
-            for place in self.first..known {
-                self.admit(on, place, bounces);
-            }
-            if wave == 0 {
-                self.arrivals.clear();
-                self.arrivals.extend(self.points[self.first..].iter().map(|point| point.time));
-            }
             for place in self.first..known {
                 self.visit(on, place, bounces);
             }
@@ -203,7 +209,31 @@ impl ImpactPropagation {
                 on.rows[row as usize].delta[..3].fill(0.0);
             }
         }
+        if on.timed && !is_done {
+            self.stay(on);
+        }
         is_done
+    }
+
+    /// Cancels the displacement of bodies that have a point, visited or not, that would end deeper.
+    fn stay(&mut self, on: &mut PropagationInput<'_>) {
+        let deeper = DEEPER * on.slop;
+        for i in 0..self.pushed.len() {
+            let mut end = self.bodies[self.pushed[i].0 as usize].first;
+            while end != NONE {
+                self.list(on, end / 2);
+                end = self.next[end as usize];
+            }
+        }
+        let mut stay: Vec<u32> = vec![];
+        for point in self.points[self.first..].iter().filter(|point| point.exists) {
+            if point.gap(on.rows) < point.separation.min(0.0) - deeper {
+                stay.extend(point.moved());
+            }
+        }
+        for row in stay {
+            on.rows[row as usize].delta[..3].fill(0.0);
+        }
     }
 
     /// Finds the points that bounce in this wave. Returns whether there are any.
@@ -232,6 +262,7 @@ impl ImpactPropagation {
                     // If the turned point does not bounce, the row of the start would still stop it, so it
                     // bounces on that row.
                     if let Some(then) = rebounds(&turned, on, is_first) {
+                        on.turn(&turned, &frame);
                         (*point, target) = (turned, then);
                     }
                 }
@@ -259,6 +290,7 @@ impl ImpactPropagation {
                 let lane = end / 2;
                 end = self.next[end as usize];
                 let first = self.list(on, lane);
+                self.visit_both(on, first);
                 self.visit(on, first, bounces);
                 self.visit(on, first + 1, bounces);
             }
@@ -267,6 +299,29 @@ impl ImpactPropagation {
                 && self.visits <= on.visits * points.min(FIRST) + points.saturating_sub(FIRST);
         }
         is_done && !self.joints.act()
+    }
+
+    /// Solves both normal impulses of a contact together, if both are positive and alternating visits would
+    /// converge slowly.
+    fn visit_both(&mut self, on: &mut PropagationInput<'_>, first: usize) {
+        let pushes = |p: &HitPoint| p.impulse[0] > 0.0 && matches!(p.role, Role::Stops | Role::Bounces);
+        if !self.points[first].is_tight || !self.points[first..first + 2].iter().all(pushes) {
+            return;
+        }
+        self.visits += 1;
+        self.meet(on, first);
+        self.meet(on, first + 1);
+        let points = [self.points[first], self.points[first + 1]];
+        let wanted = points.map(|point| point.target - point.velocity(on.rows)[0]);
+        if wanted[0].abs().max(wanted[1].abs()) <= self.slowest {
+            return;
+        }
+        let (k, old) = (points.map(|point| point.k[0]), points.map(|point| point.impulse[0]));
+        let coupling = points[0].coupling(&points[1], on.rows);
+        let Some(new) = pair::impulses(k, coupling, old, wanted) else { return };
+        for i in 0..2 {
+            self.change(on, first + i, [new[i], points[i].impulse[1]]);
+        }
     }
 
     /// Moves a point to the middle between the positions of its bodies at the time of its impact.
@@ -305,6 +360,7 @@ impl ImpactPropagation {
                 turned.turn(frame, on.rows);
                 let Some(then) = arrival(&turned, on, self.slowest) else { return false };
                 (*point, time) = (turned, then);
+                on.turn(point, frame);
                 on.fall(point);
             }
             point.time = if time < -on.dt || !on.timed { 0.0 } else { time };
@@ -423,6 +479,9 @@ impl ImpactPropagation {
             self.points.resize(first + 2, HitPoint::default());
             let points = &mut self.points[first..];
             on.read_points(lane, points);
+            let [k_0, k_1] = [points[0].k[0], points[1].k[0]];
+            points[0].is_tight =
+                points[1].exists && points[0].coupling(&points[1], on.rows).powi(2) > 0.5 * k_0 * k_1;
         }
         *listed as usize
     }

@@ -2,7 +2,7 @@
 
 use super::NONE;
 use super::find::SLOW;
-use crate::constraints::impacts::touch::{Round, TouchFrame, couplings};
+use crate::constraints::impacts::touch::{Round, TouchFrame, couplings, write_arms};
 use crate::constraints::kernels::frame::turn;
 use crate::constraints::kernels::types::ConstraintSet;
 use crate::constraints::records::batches::Batches;
@@ -81,13 +81,15 @@ pub(super) struct HitPoint {
     pub apart: [f32; 2],
     /// Whether it has the frame of its time of touch, see [`HitPoint::turn`].
     pub is_turned: bool,
+    /// On the first point: whether its coupling with the second is strong.
+    pub is_tight: bool,
 }
 
 /// The data that [`super::ImpactPropagation::run`] works on.
 pub(crate) struct PropagationInput<'a> {
     pub rows: &'a mut [BodyRow],
     /// Colored batches, serial ones.
-    pub batches: [&'a Batches; 2],
+    pub batches: [&'a mut Batches; 2],
     pub contacts: &'a mut [Contact],
     pub features: &'a Features,
     /// Changes of velocity by forces in a substep (m/s).
@@ -148,6 +150,25 @@ impl PropagationInput<'_> {
             layout,
             pushes_a: segment.pushes_a(),
         }
+    }
+
+    /// Writes the frame of the time of touch to the record of a point.
+    pub(super) fn turn(&mut self, point: &HitPoint, frame: &TouchFrame) {
+        let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
+        let rows = point.rows.map(|row| &self.rows[row as usize]);
+        frame.write_record(&layout, rows, |vector, value| floats[first + vector * width] = value);
+    }
+
+    /// Writes the arms of the impact to the record, for the rest of the step. A point that has bounced has no overlap there: it
+    /// separates without a push.
+    pub(super) fn put(&mut self, point: &HitPoint) {
+        let raised = if point.role == Role::Left { point.gap(self.rows).min(0.0) } else { 0.0 };
+        let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
+        let put = |vector: usize, value: f32| floats[first + vector * width] = value;
+        write_arms(&layout, point.index.into(), point.arms, [1.0 / point.k[0], 1.0 / point.k[1]], put);
+        floats[first + layout.at(point.index.into(), layout.separation) * width] -= raised;
     }
 
     /// Computes the effect of forces on both bodies of a point.
@@ -235,6 +256,16 @@ impl HitPoint {
         let [of_a, of_b] = self.arms;
         let along = [nx.mul_add(x, ny * y), ny.mul_add(x, -(nx * y))];
         std::array::from_fn(|i| b[2].mul_add(of_b[i], a[2].neg_mul_add(of_a[i], along[i])))
+    }
+
+    /// Normal velocity that a unit normal impulse at another point of the contact adds (1/kg).
+    pub fn coupling(&self, other: &HitPoint, rows: &[BodyRow]) -> f32 {
+        let straight = self.normal[0].mul_add(other.normal[0], self.normal[1] * other.normal[1]);
+        let of = |body: usize| {
+            let BodyRow { velocity, delta } = &rows[self.rows[body] as usize];
+            velocity[3].mul_add(straight, delta[3] * self.arms[body][0] * other.arms[body][0])
+        };
+        of(1) + if self.pushes_a { of(0) } else { 0.0 }
     }
 
     /// Gap at the current positions (m).

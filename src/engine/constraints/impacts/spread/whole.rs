@@ -131,7 +131,8 @@ impl ImpactPropagation {
     /// Solves the wave at once, the first one from the velocities before it. If it is too large or has no solution, returns false
     /// and leaves what visits have found.
     pub(super) fn whole(&mut self, on: &mut PropagationInput<'_>, is_first: bool, bounces: bool) -> bool {
-        if self.size() > LARGEST {
+        let bounces_now = self.points[self.first..].iter().any(|point| point.role == Role::Bounces);
+        if self.size() > LARGEST || bounces_now && !self.joints.act() {
             return false;
         }
         let (points, pushed) = (self.points[self.first..].to_vec(), self.pushed.len());
