@@ -52,6 +52,7 @@ impl Passes<'_> {
             h,
             slop,
             timed,
+            stops,
             types,
             poses,
             visits,

@@ -186,13 +186,15 @@ impl ImpactPropagation {
                 self.slowest = TOLERANCE * self.fastest;
                 let points = &self.points[self.first..];
                 self.arrivals.clear();
-                self.arrivals.extend(points.iter().map(|point| arrival(point, on, 0.0).unwrap_or(-on.dt)));
+                // A deeper point overlapped before.
+                let when = |time: f32| if time < -on.dt { 0.0 } else { time };
+                self.arrivals.extend(points.iter().map(|p| arrival(p, on, 0.0).map_or(-on.dt, when)));
             }
             let any = self.begin_wave(on, wave == 0, bounces);
             if wave == 0 && self.points[self.first..].iter().any(|point| point.role == Role::Bounces) {
                 self.slowest *= FINER;
             }
-            if !any && wave > 0 {
+            if !any && wave > 0 && !(on.stops && self.release(on)) {
                 is_done = true;
                 break;
             }
@@ -271,6 +273,43 @@ impl ImpactPropagation {
             (point.target, point.time) = (target[0], target[1]);
             (point.slip, point.lost) = (slip, (-v - target[0]).max(0.0));
             (point.role, point.impulse) = (Role::Bounces, [0.0; 2]);
+            any = true;
+        }
+        any
+    }
+
+    /// Applies the loads that points carried until the impact released them. Returns whether there are any.
+    ///
+    /// A block that rocks stands on one corner until the other one is hit. Its load F of the step before belongs to the first
+    /// corner until t, and in the step that is solved from its beginning on, all of it goes to the second: an error of F t
+    /// times the distance of both. So a point that an impact releases, which
+    /// is one that leaves faster than its load can bring it back within the step, gives F t beside the impact (for t < 0 it has
+    /// borne too long, and takes it back from what does not move). A force in [0, t] moves bodies by F t (dt − t/2)/m in the step.
+    fn release(&mut self, on: &mut PropagationInput<'_>) -> bool {
+        let mut any = false;
+        for place in self.first..self.points.len() {
+            let point = self.points[place];
+            let time =
+                point.rows.map(|row| self.bodies[row as usize].time).into_iter().fold(STILL.time, f32::max);
+            if point.role != Role::Open || !point.exists || time == STILL.time {
+                continue;
+            }
+            let speed = point.velocity(on.rows)[0];
+            if speed <= 0.0 {
+                continue;
+            }
+            let borne = on.borne(&point);
+            let brings_back = point.k[0] * borne[0] * (on.dt / on.h);
+            if borne[0] <= 0.0 || speed <= brings_back || Round::is_of(on.contact(&point)) {
+                continue;
+            }
+            on.release(&point);
+            if time < 0.0 && point.pushes_a || !on.timed {
+                continue;
+            }
+            let given = borne.map(|impulse| impulse * (time / on.h));
+            self.points[place].given = given;
+            self.push(on, place, given, [0.5 * time, time]);
             any = true;
         }
         any
@@ -406,11 +445,12 @@ impl ImpactPropagation {
         point.given = [point.given[0] + delta[0], point.given[1] + delta[1]];
         point.impulse = new;
         let time = point.time;
-        self.push(on, place, delta, time);
+        self.push(on, place, delta, [time; 2]);
     }
 
-    /// Applies an impulse (N·s) to both bodies of a point at `time` (s), and queues them.
-    fn push(&mut self, on: &mut PropagationInput<'_>, place: usize, impulse: [f32; 2], time: f32) {
+    /// Applies an impulse (N·s) to both bodies of a point and queues them. The impulse acts until `time` (s),
+    /// and at `at` (s) on average.
+    fn push(&mut self, on: &mut PropagationInput<'_>, place: usize, impulse: [f32; 2], [at, time]: [f32; 2]) {
         let point = &self.points[place];
         for (row, is_pushed) in point.rows.into_iter().zip([point.pushes_a, true]) {
             if !is_pushed {
@@ -426,7 +466,7 @@ impl ImpactPropagation {
                 self.queue.push_back(row);
             }
         }
-        point.push(on.rows, impulse, if on.timed { time } else { 0.0 });
+        point.push(on.rows, impulse, if on.timed { at } else { 0.0 });
     }
 
     /// Links the ends of each body, and joins bodies in contact into islands.

@@ -99,6 +99,8 @@ pub(crate) struct PropagationInput<'a> {
     pub h: f32,
     /// Overlap that is left alone (m).
     pub slop: f32,
+    /// Points that do not bounce are stopped, and those that an impact releases bear their load until its time.
+    pub stops: bool,
     /// Impacts happen at their time in the step, else at its beginning.
     pub timed: bool,
     /// Constraints other than contacts.
@@ -171,6 +173,17 @@ impl PropagationInput<'_> {
         floats[first + layout.at(point.index.into(), layout.separation) * width] -= raised;
     }
 
+    /// Removes a point's load.
+    pub(super) fn release(&mut self, point: &HitPoint) {
+        let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(self.batches[part].records_mut());
+        let mut forget = |of: usize| floats[first + layout.at(point.index.into(), of) * width] = 0.0;
+        forget(layout.normal_impulse);
+        if layout.has_friction {
+            forget(layout.tangent_impulse);
+        }
+    }
+
     /// Computes the effect of forces on both bodies of a point.
     pub(super) fn fall(&self, point: &mut HitPoint) {
         let [a, b] = point.rows.map(|row| {
@@ -204,6 +217,14 @@ impl PropagationInput<'_> {
     /// Coefficient of restitution of a point (1).
     pub(super) fn restitution(&self, point: &HitPoint) -> f32 {
         if self.bounces { self.contact(point).restitution } else { 0.0 }
+    }
+
+    /// Impulses of a point along n and t in the last substep (N·s).
+    pub(super) fn borne(&self, point: &HitPoint) -> [f32; 2] {
+        let LanePlace { part, width, first, layout, .. } = self.place(point.lane);
+        let floats: &[f32] = bytemuck::cast_slice(self.batches[part].records());
+        let at = |quantity: usize| floats[first + layout.at(point.index.into(), quantity) * width];
+        [at(layout.normal_impulse), if layout.has_friction { at(layout.tangent_impulse) } else { 0.0 }]
     }
 
     /// Fills in the points of a lane; those that it does not have are unchanged.
