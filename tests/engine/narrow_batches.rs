@@ -52,7 +52,7 @@ impl Scene {
             margins: Margins::within(SPECULATIVE),
         };
         let (mut changed, mut fresh) = (vec![], vec![]);
-        let points = update(self.kind, width, &jobs, input, &mut self.contacts, &mut |name, contact| {
+        let points = update(self.kind, width, &jobs, input, &mut self.contacts, None, &mut |name, contact, _| {
             changed.push(name);
             fresh.push(*contact);
         });

@@ -393,7 +393,7 @@ fn collide(kind: PairKind, width: LaneWidth, pairs: u32, contacts: usize, spoil:
         margins: Margins::within(0.02),
     };
     let mut contacts = vec![Contact::default(); contacts];
-    update(kind, width, &jobs, input, &mut contacts, &mut |_, _| {});
+    update(kind, width, &jobs, input, &mut contacts, None, &mut |_, _, _| {});
 }
 
 #[test]

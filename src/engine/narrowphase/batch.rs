@@ -2,6 +2,7 @@
 
 use super::Margins;
 use super::circles::{self, Rolling};
+use super::frozen::Found;
 use super::hull::HullRow;
 use super::hull_circle::HullCircle;
 use super::hulls::Hulls;
@@ -11,6 +12,7 @@ use crate::contacts::{Contact, quad};
 use crate::lanes::{IndexList, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, align_frame, prefetch_records};
 use crate::shapes::Shape;
 use bytemuck::bytes_of;
+use std::ops::Range;
 use wide::{f32x4, f32x8};
 
 /// The kernel of a pair of shapes.
@@ -48,6 +50,11 @@ impl PairKind {
             (Class::Circle, _) => Some(PairKind::CircleHull),
             _ => Some(PairKind::Hulls),
         }
+    }
+
+    /// Whether one of the shapes is a disc.
+    pub fn has_disc(self) -> bool {
+        !matches!(self, PairKind::Rectangles | PairKind::Hulls)
     }
 }
 
@@ -104,14 +111,10 @@ impl Jobs {
     /// Every pair is written after the last kept one, whether kept or not, which avoids a branch.
     #[inline(always)]
     pub fn list(&mut self, pairs: &[u32], mut job: impl FnMut(u32) -> (bool, [u32; 2], [u32; 2], u32)) {
-        let Jobs { name, bodies: [a, b], shapes: [c, d], contact } = self;
-        let mut lists = [name, a, b, c, d, contact];
+        self.resize(pairs.len());
         let mut kept = 0;
         {
-            let [name, a, b, c, d, contact] = lists.each_mut().map(|list| {
-                list.resize(pairs.len(), 0);
-                &mut list[..pairs.len()]
-            });
+            let [name, a, b, c, d, contact] = self.lists_mut().map(|list| &mut list[..pairs.len()]);
             for &pair in pairs {
                 let (keep, bodies, shapes, of_pair) = job(pair);
                 name[kept] = pair;
@@ -121,9 +124,44 @@ impl Jobs {
                 kept += usize::from(keep);
             }
         }
-        for list in lists {
-            list.truncate(kept);
+        self.resize(kept);
+    }
+
+    /// Drops the jobs from `len` on, or adds meaningless ones up to it.
+    pub fn resize(&mut self, len: usize) {
+        self.lists_mut().into_iter().for_each(|list| list.resize(len, 0));
+    }
+
+    /// Overwrites the jobs from `at` on with jobs `range` of `others`.
+    ///
+    /// # Panics
+    /// If either list is too short.
+    #[inline(always)]
+    pub fn copy(&mut self, at: usize, others: &Jobs, range: Range<usize>) {
+        for (list, other) in self.lists_mut().into_iter().zip(others.lists()) {
+            list[at..at + range.len()].copy_from_slice(&other[range.clone()]);
         }
+    }
+
+    /// Overwrites jobs `places` with jobs `range` of `others`, in this order.
+    ///
+    /// # Panics
+    /// As [`Self::copy`].
+    #[inline(always)]
+    pub fn place(&mut self, places: &[usize], others: &Jobs, range: Range<usize>) {
+        for (list, other) in self.lists_mut().into_iter().zip(others.lists()) {
+            places.iter().zip(&other[range.clone()]).for_each(|(&at, &entry)| list[at] = entry);
+        }
+    }
+
+    fn lists(&self) -> [&[u32]; 6] {
+        let Jobs { name, bodies: [a, b], shapes: [c, d], contact } = self;
+        [name, a, b, c, d, contact]
+    }
+
+    fn lists_mut(&mut self) -> [&mut Vec<u32>; 6] {
+        let Jobs { name, bodies: [a, b], shapes: [c, d], contact } = self;
+        [name, a, b, c, d, contact]
     }
 }
 
@@ -146,9 +184,12 @@ pub struct Input<'a> {
 /// Collides every job and updates its contact: geometry is recomputed, and impulses are kept for unchanged
 /// features. Returns the number of points.
 ///
-/// A contact without points gets count 0, and `change(name, contact)` is called for it. The same call reports
+/// A contact without points gets count 0, and `change(name, contact, found)` is called for it. The same call reports
 /// a touching pair that has no contact yet. The manifolds of such pairs are built in room for one more batch
 /// after the end of `contacts`.
+///
+/// `found`: the poses at which each contact was found, if contacts are [frozen](super::frozen); noted for pairs without
+/// discs.
 ///
 /// # Panics
 /// If a job refers to a body, shape or contact that does not exist, or the lists differ in length.
@@ -158,7 +199,8 @@ pub fn update(
     jobs: &Jobs,
     input: Input,
     contacts: &mut Vec<Contact>,
-    change: &mut dyn FnMut(u32, &Contact),
+    mut found: Option<&mut Vec<Found>>,
+    change: &mut Change,
 ) -> usize {
     let count = jobs.name.len();
     let below = |list, limit: usize, what: &str| {
@@ -178,6 +220,10 @@ pub fn update(
     assert!(jobs.contact.len() == count, "{count} pairs, and contacts for {}", jobs.contact.len());
     assert!(beyond as usize <= made, "a pair of contact {} of {made}", beyond.wrapping_sub(1));
     contacts.resize(made + width.lanes(), Contact::default());
+    if let Some(found) = &mut found {
+        assert!(found.len() == made, "{made} contacts, of which {} were found", found.len());
+        found.resize(contacts.len(), Found::NEVER);
+    }
     let run = match width {
         LaneWidth::W1 => run_of::<f32>(kind),
         LaneWidth::W4 => run_of::<f32x4>(kind),
@@ -187,8 +233,12 @@ pub fn update(
         #[cfg(not(any(target_feature = "avx512f", feature = "emulated")))]
         LaneWidth::W16 => unreachable!("widths are limited to those of the build"),
     };
-    let points = run(jobs, indices, input, contacts, made, change);
+    let room = Room { contacts, found: found.as_mut().map_or(&mut [], |found| &mut found[..]), made };
+    let points = run(jobs, indices, input, room, change);
     contacts.truncate(made);
+    if let Some(found) = found {
+        found.truncate(made);
+    }
     points
 }
 
@@ -199,8 +249,21 @@ struct JobIndices<'a> {
     shapes: [IndexList<'a>; 2],
 }
 
-/// Collides the pairs of one kind, as [`update`]. New manifolds are built from the given index on.
-type CollideFn = fn(&Jobs, JobIndices, Input, &mut [Contact], usize, &mut dyn FnMut(u32, &Contact)) -> usize;
+/// Where kernels write their results.
+struct Room<'a> {
+    contacts: &'a mut [Contact],
+    /// One per contact; empty if nothing is frozen.
+    found: &'a mut [Found],
+    /// New manifolds are built from this index on.
+    made: usize,
+}
+
+/// Receives the name of a pair that began or ended to touch, its contact, and the poses at which it was found if contacts
+/// are frozen.
+pub type Change<'a> = dyn FnMut(u32, &Contact, Option<Found>) + 'a;
+
+/// Collides the pairs of one kind, as [`update`].
+type CollideFn = fn(&Jobs, JobIndices, Input, Room, &mut Change) -> usize;
 
 /// A separate function per kind: in one function for all, the stack use of one kernel would make others spill.
 fn run_of<L: Lanes>(kind: PairKind) -> CollideFn {
@@ -219,24 +282,22 @@ fn run<L: Lanes, const KIND: usize>(
     jobs: &Jobs,
     indices: JobIndices,
     input: Input,
-    contacts: &mut [Contact],
-    made: usize,
-    change: &mut dyn FnMut(u32, &Contact),
+    room: Room,
+    change: &mut Change,
 ) -> usize {
     // Spilled vectors then do not cross cache lines; see `align_frame`.
     align_frame();
     let Input { poses, displacements, rolling, shapes: Shapes { rows, hulls }, margins } = input;
     match const { PairKind::ALL[KIND] } {
-        PairKind::Rectangles => run_kernel(jobs, indices, contacts, made, false, change, |bodies, shapes| {
+        PairKind::Rectangles => run_kernel(jobs, indices, room, false, change, |bodies, shapes, found, target| {
             let poses = Poses::<L>::gather(poses, bodies);
             let pair = ShapePair::gather(poses, rows, shapes);
-            (
-                rectangles::collide(&pair, margins).without_grazes().against_immovable(poses.immovable[0]),
-                [L::zero(); 2],
-            )
+            let touch =
+                rectangles::collide(&pair, margins).without_grazes().against_immovable(poses.immovable[0]);
+            (Found::note(found, target, &poses, touch, margins), [L::zero(); 2])
         }),
         PairKind::Circles => {
-            run_kernel(jobs, indices, contacts, made, rolling.is_some(), change, |bodies, shapes| {
+            run_kernel(jobs, indices, room, rolling.is_some(), change, |bodies, shapes, _, _| {
                 let poses = Poses::<L>::gather(poses, bodies);
                 let pair = ShapePair::gather(poses, rows, shapes);
                 let displacements = bodies.map(|body| L::gather_quads::<1, 0>(displacements, body));
@@ -245,18 +306,17 @@ fn run<L: Lanes, const KIND: usize>(
         }
         PairKind::Hulls => {
             let mut pair = Hulls::<L>::empty();
-            run_kernel(jobs, indices, contacts, made, false, change, |bodies, shapes| {
+            run_kernel(jobs, indices, room, false, change, |bodies, shapes, found, target| {
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(&poses, hulls, shapes);
-                (
-                    pair.collide(&poses, margins).without_grazes().against_immovable(poses.immovable[0]),
-                    [L::zero(); 2],
-                )
+                let touch =
+                    pair.collide(&poses, margins).without_grazes().against_immovable(poses.immovable[0]);
+                (Found::note(found, target, &poses, touch, margins), [L::zero(); 2])
             })
         }
         PairKind::HullCircle => {
             let mut pair = HullCircle::<L>::empty();
-            run_kernel(jobs, indices, contacts, made, rolling.is_some(), change, |bodies, shapes| {
+            run_kernel(jobs, indices, room, rolling.is_some(), change, |bodies, shapes, _, _| {
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(hulls, rows, shapes);
                 let displacements = bodies.map(|body| L::gather_quads::<1, 0>(displacements, body));
@@ -266,7 +326,7 @@ fn run<L: Lanes, const KIND: usize>(
         }
         PairKind::CircleHull => {
             let mut pair = HullCircle::<L>::empty();
-            run_kernel(jobs, indices, contacts, made, rolling.is_some(), change, |bodies, [a, b]| {
+            run_kernel(jobs, indices, room, rolling.is_some(), change, |bodies, [a, b], _, _| {
                 let poses = Poses::gather(poses, bodies).swapped();
                 pair.gather(hulls, rows, [b, a]);
                 let displacements =
@@ -278,18 +338,22 @@ fn run<L: Lanes, const KIND: usize>(
     }
 }
 
-/// Runs a kernel over all jobs. `contacts[made..]` is the room for a batch of new manifolds. `kernel`
-/// collides the pairs of the given bodies and shapes, and returns their contacts and radii of curvature.
-/// Radii are written if `has_radii`.
+/// Runs a kernel over all jobs. `kernel` collides the pairs of the given bodies and shapes, and returns their contacts
+/// and radii of curvature. It may note where it found them in the given list, at the given places. Radii are written if
+/// `has_radii`.
 #[inline(always)]
 fn run_kernel<L: Lanes>(
     jobs: &Jobs,
     indices: JobIndices,
-    contacts: &mut [Contact],
-    made: usize,
+    Room { contacts, found, made }: Room,
     has_radii: bool,
-    change: &mut dyn FnMut(u32, &Contact),
-    mut kernel: impl FnMut([LaneIndex<L::Index>; 2], [LaneIndex<L::Index>; 2]) -> (Touch<L>, [L; 2]),
+    change: &mut Change,
+    mut kernel: impl FnMut(
+        [LaneIndex<L::Index>; 2],
+        [LaneIndex<L::Index>; 2],
+        &mut [Found],
+        LaneIndex<L::Index>,
+    ) -> (Touch<L>, [L; 2]),
 ) -> usize {
     let mut points = 0_u32;
     let count = jobs.name.len();
@@ -314,8 +378,8 @@ fn run_kernel<L: Lanes>(
         let next = (first + L::WIDTH).min(count)..(first + 2 * L::WIDTH).min(count);
         let coming = jobs.contact[next].iter().map(|&i| if i == NO_CONTACT { made as u32 } else { i });
         prefetch_records::<{ quad::STRIDE }>(bytemuck::cast_slice(contacts), coming);
-        let (touch, radii) = kernel(bodies, shapes);
         let target_lanes = LaneIndex::new(&target);
+        let (touch, radii) = kernel(bodies, shapes, found, target_lanes);
         merge(&touch, bytemuck::cast_slice_mut(contacts), target_lanes);
         if has_radii {
             let quads: &mut [Quad] = bytemuck::cast_slice_mut(contacts);
@@ -340,7 +404,8 @@ fn run_kernel<L: Lanes>(
         }
         for lane in 0..filled {
             if (count[lane] > 0.0) != (known[lane] != NO_CONTACT) {
-                change(jobs.name[first + lane], &contacts[target[lane] as usize]);
+                let target = target[lane] as usize;
+                change(jobs.name[first + lane], &contacts[target], found.get(target).copied());
             }
         }
     }

@@ -47,7 +47,7 @@ impl BlockSubsteps {
     /// Releases jams, if there is a `push_speed` (m/s), and finds the bodies with joints. Returns whether these
     /// have changed since the last step.
     pub fn after_collision(&mut self, scene: &mut CollisionScene<'_>, push_speed: Option<f32>) -> bool {
-        self.rolls = scene.candidates.has_discs();
+        self.rolls = scene.has_discs;
         match push_speed {
             Some(push_speed) => self.jams.release(scene, push_speed),
             None => self.jams.clear(),

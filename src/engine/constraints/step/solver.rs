@@ -6,7 +6,6 @@ use crate::constraints::kernels::types::ConstraintSet;
 use crate::constraints::records::graph::Graph;
 use crate::constraints::records::kept::SolverState;
 use crate::contacts::Contact;
-use crate::narrowphase::candidate::Candidates;
 use crate::narrowphase::circles::Rolling;
 use crate::params::{Parameters, Without};
 use glam::Vec2;
@@ -62,8 +61,8 @@ pub struct CollisionScene<'a> {
     pub kept: &'a mut SolverState,
     /// Constraints of other types than contacts.
     pub types: &'a [ConstraintSet],
-    /// Pairs of shapes that may touch.
-    pub candidates: Candidates<'a>,
+    /// Whether a pair of shapes that may touch has a disc.
+    pub has_discs: bool,
     /// Whether contacts have come or gone since they got their lanes. Valid after the collision.
     pub contacts_changed: bool,
     /// Number of steps taken.
