@@ -40,14 +40,12 @@
 //! normal and arms by zero.
 
 use super::Margins;
-use super::batch::{Jobs, NO_CONTACT};
+use super::batch::{JobLists, NO_CONTACT};
 use super::lanes::{PoseRow, Poses, Touch, abs, rotate, unrotate};
 use crate::contacts::{Contact, quad};
-use crate::lanes::{
-    IndexList, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, align_frame, prefetch_quad, prefetch_records,
-};
+use crate::lanes::{LaneIndex, Lanes, MOST_LANES, Quad, align_frame, prefetch_quad, prefetch_records};
 use bytemuck::{Pod, Zeroable};
-use wide::{f32x4, f32x8};
+use std::ops::Range;
 
 /// Motion within which a contact stays frozen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -149,9 +147,8 @@ impl Found {
         if found.is_empty() {
             return touch;
         }
-        let parts = |v: [L; 2], least: f32| {
-            v.map(|x| (abs(x) - L::splat(least)).select_positive(x, L::zero()))
-        };
+        let parts =
+            |v: [L; 2], least: f32| v.map(|x| (abs(x) - L::splat(least)).select_positive(x, L::zero()));
         let arms = |anchors: [[L; 2]; 2]| anchors.map(|r| parts(r, NEGLIGIBLE * margins.slop));
         let normal = parts(touch.normal, NEGLIGIBLE);
         let (anchor_a, anchor_b) = (arms(touch.anchor_a), arms(touch.anchor_b));
@@ -187,127 +184,74 @@ impl<L: Lanes> Turns<L> {
     }
 }
 
-/// Lets the contacts of those jobs stay frozen whose bodies have hardly moved: their separations follow the bodies.
-/// `rest` gets the other jobs, in their order. Returns the number of points of the frozen contacts.
-///
-/// # Panics
-/// If a job refers to a body or contact that does not exist, or lists differ in length.
-pub fn follow(
-    width: LaneWidth,
-    jobs: &Jobs,
-    poses: &[PoseRow],
-    limits: FreezeLimits,
-    (contacts, found): (&mut Vec<Contact>, &mut Vec<Found>),
-    rest: &mut Jobs,
-) -> usize {
-    let run = match width {
-        LaneWidth::W1 => run::<f32>,
-        LaneWidth::W4 => run::<f32x4>,
-        LaneWidth::W8 => run::<f32x8>,
-        #[cfg(any(target_feature = "avx512f", feature = "emulated"))]
-        LaneWidth::W16 => run::<wide::f32x16>,
-        #[cfg(not(any(target_feature = "avx512f", feature = "emulated")))]
-        LaneWidth::W16 => unreachable!("widths are limited to those of the build"),
-    };
-    // Read by pairs without a contact.
-    contacts.push(Contact::default());
-    found.push(Found::NEVER);
-    let points = run(jobs, poses, limits, contacts, found, rest);
-    contacts.pop();
-    found.pop();
-    points
-}
-
-/// As [`follow`]. The last contact is that of the pairs that have none.
+/// Lets the contacts of a batch of jobs stay frozen whose bodies have hardly moved: their separations follow the bodies.
+/// Returns the number of points of each contact that stays frozen, and 0 for other jobs. Jobs without a contact read the
+/// last one, which never stays frozen.
 #[inline(never)]
-fn run<L: Lanes>(
-    jobs: &Jobs,
+pub(super) fn follow<L: Lanes>(
+    lists: JobLists,
+    batch: Range<usize>,
     poses: &[PoseRow],
     limits: FreezeLimits,
-    contacts: &mut [Contact],
-    found: &[Found],
-    rest: &mut Jobs,
-) -> usize {
+    (contacts, found): (&mut [Contact], &[Found]),
+) -> [f32; MOST_LANES] {
     use quad::{ANCHORS_0, ANCHORS_1, HEADER, STATE_0, STATE_1};
-    const CONTACT: usize = quad::STRIDE;
+    const RECORD: usize = quad::STRIDE;
     align_frame();
-    let quads: &mut [Quad] = bytemuck::cast_slice_mut(contacts);
-    let found: &[Quad] = bytemuck::cast_slice(found);
+    let (quads, found): (&mut [Quad], &[Quad]) =
+        (bytemuck::cast_slice_mut(contacts), bytemuck::cast_slice(found));
     let none = (found.len() / STRIDE - 1) as u32;
     let contact_of = |&i: &u32| if i == NO_CONTACT { none } else { i };
-    let bodies = jobs.bodies.each_ref().map(|list| IndexList::new(list));
-    let (distance, least_cosine) = (L::splat(limits.distance), L::splat(limits.turn.cos()));
+    let [a, b, .., all] = lists.0;
+    let coming = batch.end..(batch.end + L::WIDTH).min(all.entries().len());
+    for i in all.entries()[coming].iter().map(contact_of) {
+        prefetch_quad::<STRIDE, PLACE>(found, i);
+        prefetch_records::<RECORD>(quads, [i].into_iter());
+    }
+    let mut target = [none; MOST_LANES];
+    target.iter_mut().zip(&all.entries()[batch.clone()]).for_each(|(to, i)| *to = contact_of(i));
+    let target = LaneIndex::new(&target);
+    let [room_a, room_b] = &mut [[0; MOST_LANES]; 2];
+    let bodies = [a.batch_at(batch.start, room_a), b.batch_at(batch.start, room_b)];
+    let poses = Poses::<L>::gather(poses, bodies);
     let (zero, one, two) = (L::zero(), L::splat(1.0), L::splat(2.0).integer_bits());
-    let (mut points, mut left, count) = (0, 0, jobs.contact.len());
-    rest.resize(count);
-    for first in (0..count).step_by(L::WIDTH) {
-        let batch = first..(first + L::WIDTH).min(count);
-        let filled = batch.len();
-        let coming = batch.end..(batch.end + L::WIDTH).min(count);
-        for i in jobs.contact[coming].iter().map(contact_of) {
-            prefetch_quad::<STRIDE, PLACE>(found, i);
-            prefetch_records::<CONTACT>(quads, [i].into_iter());
-        }
-        // The last batch is padded with pairs that have no contact.
-        let mut target = [none; MOST_LANES];
-        target.iter_mut().zip(&jobs.contact[batch.clone()]).for_each(|(to, i)| *to = contact_of(i));
-        let target = LaneIndex::new(&target);
-        let room = &mut [[0; MOST_LANES]; 2];
-        let [a, b] = room;
-        let poses = Poses::<L>::gather(poses, [bodies[0].batch_at(first, a), bodies[1].batch_at(first, b)]);
-        let [x, y, s_0, s_1] = L::gather_quads::<STRIDE, PLACE>(found, target);
-        let [cos_a, sin_a, cos_b, sin_b] = L::gather_quads::<STRIDE, TURNS>(found, target);
-        let [now_a, now_b] = poses.rotation;
-        let offset = unrotate(now_a, poses.centers);
-        let moved = [offset[0] - x, offset[1] - y];
-        let (now, then) = (unrotate(now_a, now_b), unrotate([cos_a, sin_a], [cos_b, sin_b]));
-        let sine = abs(now[0] * then[1] - now[1] * then[0]);
-        let motion = (moved[0] * moved[0] + moved[1] * moved[1]).sqrt() + poses.extent * sine;
-        let turned_a = now_a[0] * cos_a + now_a[1] * sin_a;
-        let turned_b = now_b[0] * cos_b + now_b[1] * sin_b;
-        // No lane is near that has a NaN.
-        let near = (turned_b - least_cosine).select_positive(one, zero);
-        let near = (turned_a - least_cosine).select_positive(near, zero);
-        let mut keep = (distance - motion).select_positive(near, zero);
-        if !keep.any_positive() {
-            rest.copy(left, jobs, batch);
-            left += filled;
-            continue;
-        }
-        let [separation_0, id_0, normal_0, tangent_0] = L::gather_quads::<CONTACT, STATE_0>(quads, target);
-        let [separation_1, id_1, normal_1, tangent_1] = L::gather_quads::<CONTACT, STATE_1>(quads, target);
-        if limits.loaded_only {
-            // A point that is not in use bears nothing.
-            keep = normal_0.select_positive(normal_1.select_positive(keep, zero), zero);
-            if !keep.any_positive() {
-                rest.copy(left, jobs, batch);
-                left += filled;
-                continue;
-            }
-        }
-        let [nx, ny, used, _] = L::gather_quads::<CONTACT, HEADER>(quads, target);
-        let [ax, ay, bx, by] = L::gather_quads::<CONTACT, ANCHORS_0>(quads, target);
-        let turns = Turns::since([[cos_a, sin_a], [cos_b, sin_b]], &poses);
-        let new_0 = s_0 + turns.gap(&poses, [nx, ny], [ax, ay], [bx, by]);
-        let [ax, ay, bx, by] = L::gather_quads::<CONTACT, ANCHORS_1>(quads, target);
-        let new_1 = s_1 + turns.gap(&poses, [nx, ny], [ax, ay], [bx, by]);
-        let new_0 = keep.select_positive(new_0, separation_0);
-        let new_1 = used.select_equal(two, keep.select_positive(new_1, separation_1), separation_1);
-        L::scatter_quads::<CONTACT, STATE_0>(quads, target, [new_0, id_0, normal_0, tangent_0]);
-        L::scatter_quads::<CONTACT, STATE_1>(quads, target, [new_1, id_1, normal_1, tangent_1]);
-        let count = keep.select_positive(used.select_equal(two, L::splat(2.0), one), zero);
-        let mut counts = [0.0_f32; MOST_LANES];
-        counts[..L::WIDTH].copy_from_slice(bytemuck::cast_slice(&[count]));
-        let (mut places, start) = ([0; MOST_LANES], left);
-        for (place, &count) in places.iter_mut().zip(&counts[..filled]) {
-            *place = left;
-            left += usize::from(count == 0.0);
-            points += usize::from(count > 0.0) + usize::from(count > 1.0);
-        }
-        if left > start {
-            rest.place(&places[..filled], jobs, batch);
+    let mut counts = [0.0; MOST_LANES];
+
+    let [x, y, s_0, s_1] = L::gather_quads::<STRIDE, PLACE>(found, target);
+    let [cos_a, sin_a, cos_b, sin_b] = L::gather_quads::<STRIDE, TURNS>(found, target);
+    let ([a, b], [a_0, b_0]) = (poses.rotation, [[cos_a, sin_a], [cos_b, sin_b]]);
+    let offset = unrotate(a, poses.centers);
+    let moved = [offset[0] - x, offset[1] - y];
+    let (now, then) = (unrotate(a, b), unrotate(a_0, b_0));
+    let sine = abs(now[0] * then[1] - now[1] * then[0]);
+    let motion = (moved[0] * moved[0] + moved[1] * moved[1]).sqrt() + poses.extent * sine;
+    // Selections in turn, so that no lane with a NaN stays.
+    let turned = |p: [L; 2], q: [L; 2]| p[0] * q[0] + p[1] * q[1] - L::splat(limits.turn.cos());
+    let stays = turned(b, b_0).select_positive(one, zero);
+    let stays = turned(a, a_0).select_positive(stays, zero);
+    let mut stays = (L::splat(limits.distance) - motion).select_positive(stays, zero);
+    if !stays.any_positive() {
+        return counts;
+    }
+    let [separation_0, id_0, normal_0, tangent_0] = L::gather_quads::<RECORD, STATE_0>(quads, target);
+    let [separation_1, id_1, normal_1, tangent_1] = L::gather_quads::<RECORD, STATE_1>(quads, target);
+    if limits.loaded_only {
+        // A point that is not in use bears nothing.
+        stays = normal_0.select_positive(normal_1.select_positive(stays, zero), zero);
+        if !stays.any_positive() {
+            return counts;
         }
     }
-    rest.resize(left);
-    points
+    let [nx, ny, used, _] = L::gather_quads::<RECORD, HEADER>(quads, target);
+    let turns = Turns::since([a_0, b_0], &poses);
+    let gap = |[ax, ay, bx, by]: [L; 4]| turns.gap(&poses, [nx, ny], [ax, ay], [bx, by]);
+    let new_0 = s_0 + gap(L::gather_quads::<RECORD, ANCHORS_0>(quads, target));
+    let new_1 = s_1 + gap(L::gather_quads::<RECORD, ANCHORS_1>(quads, target));
+    let new_0 = stays.select_positive(new_0, separation_0);
+    let new_1 = used.select_equal(two, stays.select_positive(new_1, separation_1), separation_1);
+    L::scatter_quads::<RECORD, STATE_0>(quads, target, [new_0, id_0, normal_0, tangent_0]);
+    L::scatter_quads::<RECORD, STATE_1>(quads, target, [new_1, id_1, normal_1, tangent_1]);
+    let count = stays.select_positive(used.select_equal(two, L::splat(2.0), one), zero);
+    counts[..L::WIDTH].copy_from_slice(bytemuck::cast_slice(&[count]));
+    counts
 }

@@ -10,7 +10,7 @@ use crate::narrowphase::Margins;
 use crate::narrowphase::batch::{self, Input, Jobs, NO_CONTACT, PairKind, Shapes};
 use crate::narrowphase::candidate::Candidate;
 use crate::narrowphase::circles::Rolling;
-use crate::narrowphase::frozen::{self, Found};
+use crate::narrowphase::frozen::Found;
 use crate::narrowphase::lanes::PoseRow;
 use glam::Vec2;
 
@@ -33,8 +33,6 @@ pub(super) struct Narrow {
     poses: Vec<PoseRow>,
     displacements: Vec<Quad>,
     jobs: [Jobs; PairKind::ALL.len()],
-    /// The jobs of a kind whose contacts are not frozen.
-    thawed: Jobs,
     /// New contacts, in the order in which they were found, and the poses at which they were.
     fresh: Vec<(Contact, Option<Found>)>,
     last_contacts: Vec<Contact>,
@@ -83,15 +81,15 @@ impl World {
                 0.0,
             ],
         }));
-        let limits = self.settings.freezing();
-        if limits.is_some() {
+        let freezing = self.settings.freezing();
+        if freezing.is_some() {
             for (surface, &body) in self.surfaces.iter().zip(&self.shape_body) {
                 let extent = &mut narrow.poses[body as usize].rotation[3];
                 let moves = bodies.kind[body as usize] != BodyKind::Static;
                 *extent = if moves { extent.max(surface.reach) } else { 0.0 };
             }
         }
-        narrow.found.resize(if limits.is_some() { self.contacts.len() } else { 0 }, Found::NEVER);
+        narrow.found.resize(if freezing.is_some() { self.contacts.len() } else { 0 }, Found::NEVER);
         narrow.displacements.clear();
         let dt = AHEAD * self.settings.dt;
         narrow.displacements.extend((0..bodies.len()).map(|i| {
@@ -101,9 +99,7 @@ impl World {
         self.with_scene(|solver, scene| solver.before_collision(scene, &mut asked));
         let narrow = &mut self.narrow;
         narrow.list_jobs(self.contacts.len());
-        let Narrow {
-            candidates, jobs, thawed, fresh, is_changed, poses, displacements, shapes, found, ..
-        } = narrow;
+        let Narrow { candidates, jobs, fresh, is_changed, poses, displacements, shapes, found, .. } = narrow;
         fresh.clear();
         let mut change = |name: u32, contact: &Contact, found: Option<Found>| {
             let candidate = &mut candidates[name as usize];
@@ -118,15 +114,16 @@ impl World {
         };
         // `displacements` covers more than a step.
         let rolling = asked.rolling.map(|Rolling { limit }| Rolling { limit: AHEAD * limit });
-        let input =
-            Input { poses, displacements, rolling, shapes, margins: Margins::of(self.settings.length_unit) };
+        let input = Input {
+            poses,
+            displacements,
+            rolling,
+            shapes,
+            margins: Margins::of(self.settings.length_unit),
+            freezing,
+        };
         let (mut points, width, contacts) = (0, self.settings.widths()[1], &mut self.contacts);
-        for (kind, mut jobs) in PairKind::ALL.into_iter().zip(&*jobs) {
-            if let Some(limits) = limits.filter(|_| !kind.has_disc()) {
-                points += frozen::follow(width, jobs, poses, limits, (contacts, found), thawed);
-                jobs = thawed;
-            }
-            let found = limits.is_some().then_some(&mut *found);
+        for (kind, jobs) in PairKind::ALL.into_iter().zip(jobs) {
             points += batch::update(kind, width, jobs, input, contacts, found, &mut change);
         }
         if narrow.is_changed {
