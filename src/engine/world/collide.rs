@@ -1,7 +1,6 @@
 //! Updates contacts from candidates and carries their impulses from step to step.
 
 use super::World;
-use crate::bodies::BodyKind;
 use crate::constraints::Solver;
 use crate::constraints::step::{Collision, CollisionScene};
 use crate::contacts::Contact;
@@ -24,6 +23,8 @@ pub(super) struct Narrow {
     pub of_kind: [Vec<u32>; PairKind::ALL.len()],
     /// Shapes as the lane kernels read them.
     pub shapes: Shapes,
+    /// Distance of the farthest point of each body from its center of mass (m), 0 if the body is static. `[bodies]`
+    pub extents: Vec<f32>,
     /// Whether the set of contacts differs from the one assigned to lanes.
     pub is_changed: bool,
     /// Whether the jobs are all candidates with their current contacts.
@@ -67,7 +68,7 @@ impl World {
         }
         let bodies = &self.bodies;
         narrow.poses.clear();
-        narrow.poses.extend((0..bodies.len()).map(|i| PoseRow {
+        narrow.poses.extend(narrow.extents.iter().enumerate().map(|(i, &extent)| PoseRow {
             position: [
                 bodies.position_x[i],
                 bodies.position_y[i],
@@ -78,18 +79,13 @@ impl World {
                 bodies.rotation_cos[i],
                 bodies.rotation_sin[i],
                 f32::from(u8::from(!bodies.is_dynamic(i))),
-                0.0,
+                extent,
             ],
         }));
         let freezing = self.settings.freezing();
         if freezing.is_some() {
-            for (surface, &body) in self.surfaces.iter().zip(&self.shape_body) {
-                let extent = &mut narrow.poses[body as usize].rotation[3];
-                let moves = bodies.kind[body as usize] != BodyKind::Static;
-                *extent = if moves { extent.max(surface.reach) } else { 0.0 };
-            }
+            narrow.found.resize(self.contacts.len(), Found::NEVER);
         }
-        narrow.found.resize(if freezing.is_some() { self.contacts.len() } else { 0 }, Found::NEVER);
         narrow.displacements.clear();
         let dt = AHEAD * self.settings.dt;
         narrow.displacements.extend((0..bodies.len()).map(|i| {
