@@ -50,12 +50,21 @@ impl Scene {
             rolling: None,
             shapes: &self.rows,
             margins: Margins::within(SPECULATIVE),
+            freezing: None,
         };
         let (mut changed, mut fresh) = (vec![], vec![]);
-        let points = update(self.kind, width, &jobs, input, &mut self.contacts, &mut |name, contact| {
-            changed.push(name);
-            fresh.push(*contact);
-        });
+        let points = update(
+            self.kind,
+            width,
+            &jobs,
+            input,
+            &mut self.contacts,
+            &mut vec![],
+            &mut |name, contact, _| {
+                changed.push(name);
+                fresh.push(*contact);
+            },
+        );
         for (&name, contact) in changed.iter().zip(&fresh) {
             self.contact[name as usize] = match contact.manifold.count {
                 0 => NO_CONTACT,

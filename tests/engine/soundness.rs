@@ -391,9 +391,10 @@ fn collide(kind: PairKind, width: LaneWidth, pairs: u32, contacts: usize, spoil:
         rolling: None,
         shapes: &shapes,
         margins: Margins::within(0.02),
+        freezing: None,
     };
     let mut contacts = vec![Contact::default(); contacts];
-    update(kind, width, &jobs, input, &mut contacts, &mut |_, _| {});
+    update(kind, width, &jobs, input, &mut contacts, &mut vec![], &mut |_, _, _| {});
 }
 
 #[test]

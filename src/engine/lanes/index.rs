@@ -2,7 +2,7 @@
 //!
 //! A gather reads `rows[index[lane]]` in all lanes at once and does not check single lanes. It checks that
 //! the **bound** of the indices does not exceed the number of rows: one comparison, the same for all batches
-//! of a list. This suffices because of an invariant of the three types below: *every entry is less than the
+//! of a list. This suffices because of an invariant of the types below: *every entry is less than the
 //! bound*. Their fields are private, adding entries also raises the bound, and no entry can be modified from
 //! outside. This file is safe code; the unsafe code of [`super::quads`] and [`super::rows`] relies on this
 //! invariant alone.
@@ -137,6 +137,46 @@ impl<'a> IndexList<'a> {
         room.fill(rest[0]);
         room[..rest.len()].copy_from_slice(rest);
         LaneIndex { entries: first_of(room), bound }
+    }
+}
+
+/// Up to two batches of entries, copied from lists. Its places hold valid indices from the first copy on, whether or not
+/// they were written.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PickedIndices {
+    entries: [u32; 2 * MOST_LANES],
+    bound: usize,
+}
+
+impl PickedIndices {
+    /// Copies the entries of `list` to `places`, counted modulo two batches of [`MOST_LANES`].
+    #[inline(always)]
+    pub fn place(&mut self, places: &[u32], list: IndexList) {
+        self.bound = self.bound.max(list.bound);
+        for (&place, &entry) in places.iter().zip(list.entries) {
+            self.entries[place as usize % (2 * MOST_LANES)] = entry;
+        }
+    }
+
+    /// Removes the first `count` places.
+    ///
+    /// # Panics
+    /// If there are fewer.
+    #[inline(always)]
+    pub fn drop_first(&mut self, count: usize) {
+        self.entries.copy_within(count.., 0);
+    }
+
+    /// The first entries, one per lane.
+    #[inline(always)]
+    pub fn batch<I: Pod>(&self) -> LaneIndex<'_, I> {
+        LaneIndex { entries: first_of(&self.entries), bound: self.bound }
+    }
+
+    /// All entries.
+    #[inline(always)]
+    pub fn entries(&self) -> &[u32] {
+        &self.entries
     }
 }
 

@@ -24,7 +24,7 @@ mod width;
 
 pub use aligned::{Block, LaneVec};
 pub use frame::align_frame;
-pub use index::{IndexList, Indices, LaneIndex, MOST_LANES};
+pub use index::{IndexList, Indices, LaneIndex, MOST_LANES, PickedIndices};
 pub use quads::{Quad, prefetch, prefetch_quad, prefetch_records};
 pub use rows::BodyRow;
 pub use store::RowStore;

@@ -2,13 +2,16 @@
 
 use super::Margins;
 use super::circles::{self, Rolling};
+use super::frozen::{self, Found, FreezeLimits};
 use super::hull::HullRow;
 use super::hull_circle::HullCircle;
 use super::hulls::Hulls;
 use super::lanes::{Class, PoseRow, Poses, ShapePair, ShapeRow, Touch};
 use super::rectangles;
 use crate::contacts::{Contact, quad};
-use crate::lanes::{IndexList, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, align_frame, prefetch_records};
+use crate::lanes::{
+    IndexList, LaneIndex, LaneWidth, Lanes, MOST_LANES, PickedIndices, Quad, align_frame, prefetch_records,
+};
 use crate::shapes::Shape;
 use bytemuck::bytes_of;
 use wide::{f32x4, f32x8};
@@ -48,6 +51,11 @@ impl PairKind {
             (Class::Circle, _) => Some(PairKind::CircleHull),
             _ => Some(PairKind::Hulls),
         }
+    }
+
+    /// Whether one of the shapes is a disc.
+    pub fn has_disc(self) -> bool {
+        !matches!(self, PairKind::Rectangles | PairKind::Hulls)
     }
 }
 
@@ -141,14 +149,19 @@ pub struct Input<'a> {
     pub shapes: &'a Shapes,
     /// Distance thresholds.
     pub margins: Margins,
+    /// Limits within which contacts are [frozen](super::frozen).
+    pub freezing: Option<FreezeLimits>,
 }
 
 /// Collides every job and updates its contact: geometry is recomputed, and impulses are kept for unchanged
 /// features. Returns the number of points.
 ///
-/// A contact without points gets count 0, and `change(name, contact)` is called for it. The same call reports
+/// A contact without points gets count 0, and `change(name, contact, found)` is called for it. The same call reports
 /// a touching pair that has no contact yet. The manifolds of such pairs are built in room for one more batch
 /// after the end of `contacts`.
+///
+/// `found`: the poses at which each contact was found; used if contacts are [frozen](super::frozen), for pairs without
+/// discs.
 ///
 /// # Panics
 /// If a job refers to a body, shape or contact that does not exist, or the lists differ in length.
@@ -158,7 +171,8 @@ pub fn update(
     jobs: &Jobs,
     input: Input,
     contacts: &mut Vec<Contact>,
-    change: &mut dyn FnMut(u32, &Contact),
+    found: &mut Vec<Found>,
+    change: &mut Change,
 ) -> usize {
     let count = jobs.name.len();
     let below = |list, limit: usize, what: &str| {
@@ -169,15 +183,20 @@ pub fn update(
     };
     let made = contacts.len();
     assert!(input.displacements.len() == input.poses.len(), "displacements of as many bodies as poses");
-    let indices = JobIndices {
-        bodies: jobs.bodies.each_ref().map(|list| below(list, input.poses.len(), "bodies")),
-        shapes: jobs.shapes.each_ref().map(|list| below(list, input.shapes.rows.len(), "shapes")),
-    };
+    let [a, b] = jobs.bodies.each_ref().map(|list| below(list, input.poses.len(), "bodies"));
+    let [c, d] = jobs.shapes.each_ref().map(|list| below(list, input.shapes.rows.len(), "shapes"));
     // [`NO_CONTACT`] is the largest number, so adding one makes it the smallest.
     let beyond = jobs.contact.iter().fold(0, |most, &i| i.wrapping_add(1).max(most));
     assert!(jobs.contact.len() == count, "{count} pairs, and contacts for {}", jobs.contact.len());
     assert!(beyond as usize <= made, "a pair of contact {} of {made}", beyond.wrapping_sub(1));
-    contacts.resize(made + width.lanes(), Contact::default());
+    // A batch of new contacts, and one that pairs without a contact read.
+    contacts.resize(made + width.lanes() + 1, Contact::default());
+    if input.freezing.is_some() {
+        assert!(found.len() == made, "{made} contacts, of which {} were found", found.len());
+        found.resize(contacts.len(), Found::NEVER);
+    } else {
+        found.clear();
+    }
     let run = match width {
         LaneWidth::W1 => run_of::<f32>(kind),
         LaneWidth::W4 => run_of::<f32x4>(kind),
@@ -187,20 +206,37 @@ pub fn update(
         #[cfg(not(any(target_feature = "avx512f", feature = "emulated")))]
         LaneWidth::W16 => unreachable!("widths are limited to those of the build"),
     };
-    let points = run(jobs, indices, input, contacts, made, change);
+    let lists = JobLists([a, b, c, d, IndexList::new(&jobs.name), IndexList::new(&jobs.contact)]);
+    let points = run(lists, input, Room { contacts, found, made }, change);
     contacts.truncate(made);
+    found.truncate(made);
     points
 }
 
-/// Index lists used by kernels for gathers.
+/// The lists of [`Jobs`]: bodies and shapes of a and b, with a checked bound, names, and contacts.
 #[derive(Clone, Copy)]
-struct JobIndices<'a> {
-    bodies: [IndexList<'a>; 2],
-    shapes: [IndexList<'a>; 2],
+pub(super) struct JobLists<'a>(pub [IndexList<'a>; LISTS]);
+
+/// Lists of [`Jobs`].
+const LISTS: usize = 6;
+/// The last of [`JobLists`].
+pub(super) const CONTACT: usize = LISTS - 1;
+
+/// Where kernels write their results.
+struct Room<'a> {
+    contacts: &'a mut [Contact],
+    /// One per contact; empty if nothing is frozen.
+    found: &'a mut [Found],
+    /// New manifolds are built from this index on.
+    made: usize,
 }
 
-/// Collides the pairs of one kind, as [`update`]. New manifolds are built from the given index on.
-type CollideFn = fn(&Jobs, JobIndices, Input, &mut [Contact], usize, &mut dyn FnMut(u32, &Contact)) -> usize;
+/// Receives the name of a pair that began or ended to touch, its contact, and the poses at which it was found if contacts
+/// are frozen.
+pub type Change<'a> = dyn FnMut(u32, &Contact, Option<Found>) + 'a;
+
+/// Collides the pairs of one kind, as [`update`].
+type CollideFn = fn(JobLists, Input, Room, &mut Change) -> usize;
 
 /// A separate function per kind: in one function for all, the stack use of one kernel would make others spill.
 fn run_of<L: Lanes>(kind: PairKind) -> CollideFn {
@@ -215,48 +251,46 @@ fn run_of<L: Lanes>(kind: PairKind) -> CollideFn {
 
 /// `KIND` is the index of the kind in [`PairKind::ALL`].
 #[inline(never)]
-fn run<L: Lanes, const KIND: usize>(
-    jobs: &Jobs,
-    indices: JobIndices,
-    input: Input,
-    contacts: &mut [Contact],
-    made: usize,
-    change: &mut dyn FnMut(u32, &Contact),
-) -> usize {
+fn run<L: Lanes, const KIND: usize>(lists: JobLists, input: Input, room: Room, change: &mut Change) -> usize {
     // Spilled vectors then do not cross cache lines; see `align_frame`.
     align_frame();
-    let Input { poses, displacements, rolling, shapes: Shapes { rows, hulls }, margins } = input;
+    let Input { poses, displacements, rolling, shapes: Shapes { rows, hulls }, margins, freezing } = input;
+    let freezing = freezing.map(|limits| (limits, poses));
+    let has_radii = rolling.is_some();
     match const { PairKind::ALL[KIND] } {
-        PairKind::Rectangles => run_kernel(jobs, indices, contacts, made, false, change, |bodies, shapes| {
-            let poses = Poses::<L>::gather(poses, bodies);
-            let pair = ShapePair::gather(poses, rows, shapes);
-            (
-                rectangles::collide(&pair, margins).without_grazes().against_immovable(poses.immovable[0]),
-                [L::zero(); 2],
-            )
-        }),
-        PairKind::Circles => {
-            run_kernel(jobs, indices, contacts, made, rolling.is_some(), change, |bodies, shapes| {
+        PairKind::Rectangles => {
+            run_kernel(lists, room, freezing, false, change, |[a, b, c, d], found, target| {
+                let (bodies, shapes) = ([a, b], [c, d]);
                 let poses = Poses::<L>::gather(poses, bodies);
                 let pair = ShapePair::gather(poses, rows, shapes);
-                let displacements = bodies.map(|body| L::gather_quads::<1, 0>(displacements, body));
-                circles::in_step(&pair, displacements, rolling, margins)
+                let touch = rectangles::collide(&pair, margins)
+                    .without_grazes()
+                    .against_immovable(poses.immovable[0]);
+                (Found::note(found, target, &poses, touch, margins), [L::zero(); 2])
             })
         }
+        PairKind::Circles => run_kernel(lists, room, None, has_radii, change, |[a, b, c, d], _, _| {
+            let (bodies, shapes) = ([a, b], [c, d]);
+            let poses = Poses::<L>::gather(poses, bodies);
+            let pair = ShapePair::gather(poses, rows, shapes);
+            let displacements = bodies.map(|body| L::gather_quads::<1, 0>(displacements, body));
+            circles::in_step(&pair, displacements, rolling, margins)
+        }),
         PairKind::Hulls => {
             let mut pair = Hulls::<L>::empty();
-            run_kernel(jobs, indices, contacts, made, false, change, |bodies, shapes| {
+            run_kernel(lists, room, freezing, false, change, |[a, b, c, d], found, target| {
+                let (bodies, shapes) = ([a, b], [c, d]);
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(&poses, hulls, shapes);
-                (
-                    pair.collide(&poses, margins).without_grazes().against_immovable(poses.immovable[0]),
-                    [L::zero(); 2],
-                )
+                let touch =
+                    pair.collide(&poses, margins).without_grazes().against_immovable(poses.immovable[0]);
+                (Found::note(found, target, &poses, touch, margins), [L::zero(); 2])
             })
         }
         PairKind::HullCircle => {
             let mut pair = HullCircle::<L>::empty();
-            run_kernel(jobs, indices, contacts, made, rolling.is_some(), change, |bodies, shapes| {
+            run_kernel(lists, room, None, has_radii, change, |[a, b, c, d], _, _| {
+                let (bodies, shapes) = ([a, b], [c, d]);
                 let poses = Poses::gather(poses, bodies);
                 pair.gather(hulls, rows, shapes);
                 let displacements = bodies.map(|body| L::gather_quads::<1, 0>(displacements, body));
@@ -266,9 +300,10 @@ fn run<L: Lanes, const KIND: usize>(
         }
         PairKind::CircleHull => {
             let mut pair = HullCircle::<L>::empty();
-            run_kernel(jobs, indices, contacts, made, rolling.is_some(), change, |bodies, [a, b]| {
+            run_kernel(lists, room, None, has_radii, change, |[a, b, c, d], _, _| {
+                let bodies = [a, b];
                 let poses = Poses::gather(poses, bodies).swapped();
-                pair.gather(hulls, rows, [b, a]);
+                pair.gather(hulls, rows, [d, c]);
                 let displacements =
                     [bodies[1], bodies[0]].map(|body| L::gather_quads::<1, 0>(displacements, body));
                 let (touch, gap, [hull, circle]) = pair.in_step(&poses, displacements, rolling, margins);
@@ -278,44 +313,86 @@ fn run<L: Lanes, const KIND: usize>(
     }
 }
 
-/// Runs a kernel over all jobs. `contacts[made..]` is the room for a batch of new manifolds. `kernel`
-/// collides the pairs of the given bodies and shapes, and returns their contacts and radii of curvature.
-/// Radii are written if `has_radii`.
+/// Runs a kernel over all jobs whose contacts do not stay frozen within the limits, if there are any. `kernel` collides
+/// the pairs of the given bodies and shapes, and returns their contacts and radii of curvature. It may note where it
+/// found them in the given list, at the given places. Radii are written if `has_radii`.
 #[inline(always)]
 fn run_kernel<L: Lanes>(
-    jobs: &Jobs,
-    indices: JobIndices,
-    contacts: &mut [Contact],
-    made: usize,
+    lists: JobLists,
+    Room { contacts, found, made }: Room,
+    freezing: Option<(FreezeLimits, &[PoseRow])>,
     has_radii: bool,
-    change: &mut dyn FnMut(u32, &Contact),
-    mut kernel: impl FnMut([LaneIndex<L::Index>; 2], [LaneIndex<L::Index>; 2]) -> (Touch<L>, [L; 2]),
+    change: &mut Change,
+    mut kernel: impl FnMut([LaneIndex<L::Index>; 4], &mut [Found], LaneIndex<L::Index>) -> (Touch<L>, [L; 2]),
 ) -> usize {
-    let mut points = 0_u32;
-    let count = jobs.name.len();
-    for first in (0..count).step_by(L::WIDTH) {
-        // The last batch is padded with its first pair, whose result goes to the spare room, as do the
+    let (mut points, mut next) = (0_u32, 0);
+    let count = lists.0[CONTACT].entries().len();
+    let (mut picked, mut waiting) = ([PickedIndices::default(); LISTS], 0);
+    loop {
+        if let Some((limits, poses)) = freezing {
+            // Jobs are collected until a batch is full.
+            while waiting < L::WIDTH && next < count {
+                let first = next;
+                next = (first + L::WIDTH).min(count);
+                let kept = frozen::follow::<L>(lists, first..next, poses, limits, (contacts, found));
+                let mut places = [0; MOST_LANES];
+                let before = waiting;
+                for (place, kept) in places.iter_mut().zip(&kept[..next - first]) {
+                    *place = waiting as u32;
+                    waiting += usize::from(*kept == 0.0);
+                    points += u32::from(*kept > 0.0) + u32::from(*kept > 1.0);
+                }
+                if waiting > before {
+                    let places = &places[..next - first];
+                    picked
+                        .iter_mut()
+                        .zip(lists.0)
+                        .for_each(|(picked, l)| picked.place(places, l.part(first..next)));
+                }
+            }
+        } else {
+            waiting = count - next;
+        }
+        if waiting == 0 {
+            return points as usize;
+        }
+        let filled = waiting.min(L::WIDTH);
+        // The last batch is padded with other pairs, whose result goes to the spare room, as do the
         // results of pairs without a contact. Impulses in the spare room are always zero.
-        let [a, b, c, d] = &mut [[0; MOST_LANES]; 4];
-        let bodies = [indices.bodies[0].batch_at(first, a), indices.bodies[1].batch_at(first, b)];
-        let shapes = [indices.shapes[0].batch_at(first, c), indices.shapes[1].batch_at(first, d)];
-        let filled = (count - first).min(L::WIDTH);
+        let rooms = &mut [[0; MOST_LANES]; 4];
+        let (indices, names, known_contacts) = if freezing.is_some() {
+            let [a, b, c, d, name, contact] = &picked;
+            ([a, b, c, d].map(|list| list.batch()), name.entries(), &contact.entries()[..filled])
+        } else {
+            let [a, b, c, d, name, contact] = &lists.0;
+            let [room_a, room_b, room_c, room_d] = rooms;
+            let indices = [
+                a.batch_at(next, room_a),
+                b.batch_at(next, room_b),
+                c.batch_at(next, room_c),
+                d.batch_at(next, room_d),
+            ];
+            // Contacts are less often cached than poses and shapes, so those of the next batch are prefetched.
+            let coming = (next + L::WIDTH).min(count)..(next + 2 * L::WIDTH).min(count);
+            let coming =
+                contact.entries()[coming].iter().map(|&i| if i == NO_CONTACT { made as u32 } else { i });
+            prefetch_records::<{ quad::STRIDE }>(bytemuck::cast_slice(contacts), coming);
+            let of_batch = next..next + filled;
+            next += filled;
+            (indices, &name.entries()[of_batch.clone()], &contact.entries()[of_batch])
+        };
         let mut known = [NO_CONTACT; MOST_LANES];
-        match jobs.contact.get(first..first + L::WIDTH) {
+        match known_contacts.get(..L::WIDTH) {
             // A constant length avoids a function call.
             Some(whole) => known[..L::WIDTH].copy_from_slice(whole),
-            None => known[..filled].copy_from_slice(&jobs.contact[first..]),
+            None => known[..filled].copy_from_slice(known_contacts),
         }
         let mut target = [0; MOST_LANES];
         for (lane, (target, &known)) in target.iter_mut().zip(&known).enumerate() {
             *target = if known == NO_CONTACT { (made + lane) as u32 } else { known };
         }
-        // Contacts are less often cached than poses and shapes, so those of the next batch are prefetched.
-        let next = (first + L::WIDTH).min(count)..(first + 2 * L::WIDTH).min(count);
-        let coming = jobs.contact[next].iter().map(|&i| if i == NO_CONTACT { made as u32 } else { i });
-        prefetch_records::<{ quad::STRIDE }>(bytemuck::cast_slice(contacts), coming);
-        let (touch, radii) = kernel(bodies, shapes);
         let target_lanes = LaneIndex::new(&target);
+        let (touch, radii) = kernel(indices, found, target_lanes);
         merge(&touch, bytemuck::cast_slice_mut(contacts), target_lanes);
         if has_radii {
             let quads: &mut [Quad] = bytemuck::cast_slice_mut(contacts);
@@ -324,27 +401,30 @@ fn run_kernel<L: Lanes>(
             L::scatter_quads::<{ quad::STRIDE }, { quad::RADII }>(quads, target_lanes, last);
         }
         // Counts are copied to memory, so that a batch without changes needs only one comparison.
-        let mut count = [0.0_f32; MOST_LANES];
-        count[..L::WIDTH].copy_from_slice(bytemuck::cast_slice(&[touch.count]));
+        let mut counts = [0.0_f32; MOST_LANES];
+        counts[..L::WIDTH].copy_from_slice(bytemuck::cast_slice(&[touch.count]));
         if filled < L::WIDTH {
-            count[filled..].fill(0.0);
+            counts[filled..].fill(0.0);
         }
         let mut is_changed = false;
-        for (&count, &known) in count[..L::WIDTH].iter().zip(&known) {
+        for (&count, &known) in counts[..L::WIDTH].iter().zip(&known) {
             // Compared instead of converted: before AVX-512 there is no conversion to unsigned integers.
             points += u32::from(count > 0.0) + u32::from(count > 1.0);
             is_changed |= (count > 0.0) != (known != NO_CONTACT);
         }
-        if !is_changed {
-            continue;
-        }
-        for lane in 0..filled {
-            if (count[lane] > 0.0) != (known[lane] != NO_CONTACT) {
-                change(jobs.name[first + lane], &contacts[target[lane] as usize]);
+        if is_changed {
+            for lane in 0..filled {
+                if (counts[lane] > 0.0) != (known[lane] != NO_CONTACT) {
+                    let target = target[lane] as usize;
+                    change(names[lane], &contacts[target], found.get(target).copied());
+                }
             }
         }
+        if freezing.is_some() && waiting > L::WIDTH {
+            picked.iter_mut().for_each(|list| list.drop_first(L::WIDTH));
+        }
+        waiting -= filled;
     }
-    points as usize
 }
 
 /// Writes manifolds into contacts. A point keeps the impulses of the old point with the same feature id.

@@ -1,7 +1,5 @@
 //! A pair of shapes whose bounds overlap.
 
-use super::batch::PairKind;
-use super::lanes::PoseRow;
 use crate::contacts::{Contact, pair_key};
 
 /// A pair of shapes that may touch.
@@ -40,32 +38,5 @@ impl Candidate {
             restitution: self.restitution,
             ..Contact::default()
         }
-    }
-}
-
-/// All candidates of a step.
-#[derive(Clone, Copy)]
-pub struct Candidates<'a> {
-    /// Sorted by shape pair.
-    pub all: &'a [Candidate],
-    /// Indices into `all` by [`PairKind`], sorted by pair.
-    pub of_kind: &'a [Vec<u32>; PairKind::ALL.len()],
-    /// Poses by body.
-    pub poses: &'a [PoseRow],
-}
-
-impl<'a> Candidates<'a> {
-    /// Index, candidate and poses of all candidates of a kind, sorted by pair.
-    pub fn of(self, kind: PairKind) -> impl Iterator<Item = (u32, &'a Candidate, [&'a PoseRow; 2])> {
-        self.of_kind[kind as usize].iter().map(move |&place| {
-            let candidate = &self.all[place as usize];
-            (place, candidate, candidate.bodies.map(|body| &self.poses[body as usize]))
-        })
-    }
-
-    /// Whether a pair has a disc.
-    pub fn has_discs(&self) -> bool {
-        use PairKind::{CircleHull, Circles, HullCircle};
-        [Circles, HullCircle, CircleHull].into_iter().any(|kind| !self.of_kind[kind as usize].is_empty())
     }
 }

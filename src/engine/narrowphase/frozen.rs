@@ -31,12 +31,21 @@
 //! by δ/b, with δ ≤ distance.
 //!
 //! Contacts of discs are never frozen: their points do not stay fixed on them.
+//!
+//! # Subnormal numbers
+//!
+//! In the first steps of a symmetric scene, bodies turn by angles as small as 1e-40. Rounding soon hides them in a fresh
+//! contact, but a frozen one would keep them, and their products with small velocities are subnormal. Many processors
+//! take more than a hundred cycles for each such product. [`Found::note`] therefore replaces negligible parts of
+//! normal and arms by zero.
 
-use super::batch::{NO_CONTACT, PairKind};
-use super::candidate::{Candidate, Candidates};
-use super::lanes::PoseRow;
-use crate::contacts::Contact;
-use glam::Vec2;
+use super::Margins;
+use super::batch::{JobLists, NO_CONTACT};
+use super::lanes::{PoseRow, Poses, Touch, abs, rotate, unrotate};
+use crate::contacts::{Contact, quad};
+use crate::lanes::{LaneIndex, Lanes, MOST_LANES, Quad, align_frame, prefetch_quad, prefetch_records};
+use bytemuck::{Pod, Zeroable};
+use std::ops::Range;
 
 /// Motion within which a contact stays frozen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,181 +109,149 @@ impl std::fmt::Display for Freezing {
     }
 }
 
-/// Kinds of pairs whose contacts are frozen.
-const KINDS: [PairKind; 2] = [PairKind::Rectangles, PairKind::Hulls];
-
-/// The poses at which a manifold was found.
-#[derive(Clone, Copy, Debug)]
+/// The poses at which a manifold was found, as two quads.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C, align(32))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-struct FrozenManifold {
-    /// Sort key of [`Candidates`].
-    pair: u64,
-    /// d, in the frame of a (m).
-    offset: Vec2,
+pub struct Found {
+    /// d in the frame of a, and s₀ of both points (m).
+    place: [f32; 4],
     /// Cosine and sine of the rotations of a and b.
-    turns: [Vec2; 2],
-    /// s₀ of each point (m).
-    separation: [f32; 2],
+    turns: [f32; 4],
 }
 
-/// The frozen contacts of a world, see the [module](self).
-#[derive(Clone, Debug, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct FrozenContacts {
-    /// By kind, sorted by pair.
-    found: [Vec<FrozenManifold>; KINDS.len()],
-    #[cfg_attr(feature = "serde", serde(skip))]
-    last_found: [Vec<FrozenManifold>; KINDS.len()],
-    /// Whether the manifold of each candidate is kept in this step; empty if nothing is frozen. `[candidates]`
-    #[cfg_attr(feature = "serde", serde(skip))]
-    keep: Vec<bool>,
-    /// Farthest point of each body from its center, 0 if it is static (m).
-    #[cfg_attr(feature = "serde", serde(skip))]
-    extents: Vec<f32>,
-}
+/// Quads of a [`Found`].
+const STRIDE: usize = 2;
+const PLACE: usize = 0;
+const TURNS: usize = 1;
 
-/// x_b − x_a, including the low parts of the positions (m), and both rotations.
-fn poses([a, b]: [&PoseRow; 2]) -> (Vec2, [Vec2; 2]) {
-    let along = |k: usize| (b.position[k] - a.position[k]) + (b.position[k + 2] - a.position[k + 2]);
-    let rotation = |row: &PoseRow| Vec2::new(row.rotation[0], row.rotation[1]);
-    (Vec2::new(along(0), along(1)), [rotation(a), rotation(b)])
-}
+/// Parts of a normal below this, and parts of arms below this share of the slop, are zero in a frozen contact (1). It is
+/// far below the rounding of a unit vector, and far above numbers whose products are subnormal.
+const NEGLIGIBLE: f32 = 1e-10;
 
-/// `vector` in the coordinates of a frame.
-fn unrotate(frame: Vec2, vector: Vec2) -> Vec2 {
-    Vec2::new(frame.x, -frame.y).rotate(vector)
-}
+impl Found {
+    /// Of a contact that is found again in the next step.
+    pub const NEVER: Found = Found { place: [f32::MAX; 4], turns: [0.0; 4] };
 
-impl FrozenManifold {
-    fn new(pair: u64, contact: &mut Contact, bodies: [&PoseRow; 2]) -> Self {
-        let (d, turns) = poses(bodies);
-        let offset = unrotate(turns[0], d);
-        let mut found = FrozenManifold { pair, offset, turns, separation: [0.0; 2] };
-        let fresh = contact.manifold.points.map(|p| p.separation);
-        // The result of the formula without s₀.
-        found.follow(contact, bodies);
-        for (s, (fresh, point)) in
-            found.separation.iter_mut().zip(fresh.into_iter().zip(&contact.manifold.points))
-        {
-            *s = fresh - point.separation;
+    /// Notes the poses of contacts that were just found, for the contacts `target`. Returns them without negligible
+    /// parts, and with separations rounded as those that will [follow](follow), so that a second collision at the same
+    /// poses gives the same contacts. Does nothing if `found` is empty.
+    #[inline(always)]
+    pub fn note<L: Lanes>(
+        found: &mut [Found],
+        target: LaneIndex<L::Index>,
+        poses: &Poses<L>,
+        touch: Touch<L>,
+        margins: Margins,
+    ) -> Touch<L> {
+        if found.is_empty() {
+            return touch;
         }
-        // Rounded as in later steps, so that a second collision pass gives the same contacts.
-        found.follow(contact, bodies);
-        found
-    }
-
-    /// Whether the bodies have moved by less than a distance (m) and turned by less than the angle of this cosine;
-    /// `extent` is ρ (m).
-    fn is_near(&self, bodies: [&PoseRow; 2], extent: f32, distance: f32, least_cosine: f32) -> bool {
-        let (d, [a, b]) = poses(bodies);
-        let [a_0, b_0] = self.turns;
-        let sine = unrotate(a, b).perp_dot(unrotate(a_0, b_0)).abs();
-        (unrotate(a, d) - self.offset).length() + extent * sine < distance
-            && a.dot(a_0) > least_cosine
-            && b.dot(b_0) > least_cosine
-    }
-
-    /// Writes the separations for the current poses of the bodies.
-    fn follow(&self, contact: &mut Contact, bodies: [&PoseRow; 2]) {
-        let (d, [a, b]) = poses(bodies);
-        let [turn_a, turn_b] = [unrotate(self.turns[0], a), unrotate(self.turns[1], b)];
-        let manifold = &mut contact.manifold;
-        for (point, s) in manifold.points.iter_mut().zip(self.separation).take(manifold.count as usize) {
-            let gap = d + turn_b.rotate(point.anchor_b) - turn_a.rotate(point.anchor_a);
-            point.separation = s + manifold.normal.dot(gap);
-        }
+        let parts =
+            |v: [L; 2], least: f32| v.map(|x| (abs(x) - L::splat(least)).select_positive(x, L::zero()));
+        let arms = |anchors: [[L; 2]; 2]| anchors.map(|r| parts(r, NEGLIGIBLE * margins.slop));
+        let normal = parts(touch.normal, NEGLIGIBLE);
+        let (anchor_a, anchor_b) = (arms(touch.anchor_a), arms(touch.anchor_b));
+        let [a, b] = poses.rotation;
+        let turns = Turns::since([a, b], poses);
+        let gap = [0, 1].map(|p| turns.gap(poses, normal, anchor_a[p], anchor_b[p]));
+        let start = [0, 1].map(|p| touch.separation[p] - gap[p]);
+        let [x, y] = unrotate(a, poses.centers);
+        let quads: &mut [Quad] = bytemuck::cast_slice_mut(found);
+        L::scatter_quads::<STRIDE, PLACE>(quads, target, [x, y, start[0], start[1]]);
+        L::scatter_quads::<STRIDE, TURNS>(quads, target, [a[0], a[1], b[0], b[1]]);
+        let separation = [0, 1].map(|p| start[p] + gap[p]);
+        Touch { normal, anchor_a, anchor_b, separation, ..touch }
     }
 }
 
-impl FrozenContacts {
-    /// For each candidate, whether its manifold is kept in this step; empty if nothing is frozen.
-    pub fn keep(&self) -> &[bool] {
-        &self.keep
+/// Rotations Δθ of a and b, (cos, sin).
+struct Turns<L>([[L; 2]; 2]);
+
+impl<L: Lanes> Turns<L> {
+    /// From earlier rotations of a and b.
+    #[inline(always)]
+    fn since([a, b]: [[L; 2]; 2], poses: &Poses<L>) -> Self {
+        Turns([unrotate(a, poses.rotation[0]), unrotate(b, poses.rotation[1])])
     }
 
-    /// Updates the separations of frozen contacts to the current poses, and thaws those whose bodies have moved.
-    /// `reaches`: the body of each shape, and its farthest point from the center of that body, 0 if the body is
-    /// static (m).
-    pub fn update(
-        &mut self,
-        candidates: Candidates<'_>,
-        contacts: &mut [Contact],
-        limits: Option<FreezeLimits>,
-        reaches: impl Iterator<Item = (u32, f32)>,
-    ) {
-        self.keep.clear();
-        let Some(FreezeLimits { distance, turn, loaded_only }) = limits else {
-            self.found.iter_mut().for_each(Vec::clear);
-            return;
-        };
-        self.keep.resize(candidates.all.len(), false);
-        self.extents.clear();
-        self.extents.resize(candidates.poses.len(), 0.0);
-        for (body, reach) in reaches {
-            let extent = &mut self.extents[body as usize];
-            *extent = extent.max(reach);
-        }
-        let least_cosine = turn.cos();
-        for (found, kind) in self.found.iter().zip(KINDS) {
-            for (place, candidate, bodies, found) in touching(candidates, kind, found) {
-                let Some(found) = found else { continue };
-                let contact = &mut contacts[candidate.contact as usize];
-                let [a, b] = candidate.bodies.map(|body| self.extents[body as usize]);
-                let bears = contact.manifold.points().iter().filter(|p| p.normal_impulse > 0.0).count() == 2;
-                if found.is_near(bodies, a.max(b), distance, least_cosine) && (bears || !loaded_only) {
-                    found.follow(contact, bodies);
-                    self.keep[place] = true;
-                }
-            }
-        }
-    }
-
-    /// Notes the poses of the manifolds that were found in this step.
-    pub fn note(&mut self, candidates: Candidates<'_>, contacts: &mut [Contact]) {
-        if self.keep.is_empty() {
-            return;
-        }
-        for ((found, last), kind) in self.found.iter_mut().zip(&mut self.last_found).zip(KINDS) {
-            let pairs = with_contact(candidates, kind).map(|(_, candidate, _)| candidate.pair());
-            let is_same = pairs.eq(found.iter().map(|f| f.pair));
-            if !is_same {
-                std::mem::swap(found, last);
-                found.clear();
-                found.extend(touching(candidates, kind, last).map(|(place, candidate, bodies, old)| {
-                    let contact = &mut contacts[candidate.contact as usize];
-                    let old = old.filter(|_| self.keep[place]).copied();
-                    old.unwrap_or_else(|| FrozenManifold::new(candidate.pair(), contact, bodies))
-                }));
-                continue;
-            }
-            for ((place, candidate, bodies), found) in with_contact(candidates, kind).zip(found) {
-                if !self.keep[place as usize] {
-                    let contact = &mut contacts[candidate.contact as usize];
-                    *found = FrozenManifold::new(candidate.pair(), contact, bodies);
-                }
-            }
-        }
+    /// n·(d + R(Δθ_b) r_b − R(Δθ_a) r_a) (m).
+    #[inline(always)]
+    fn gap(&self, poses: &Poses<L>, [nx, ny]: [L; 2], anchor_a: [L; 2], anchor_b: [L; 2]) -> L {
+        let (a, b) = (rotate(self.0[0], anchor_a), rotate(self.0[1], anchor_b));
+        let gap = |k: usize| poses.centers[k] + b[k] - a[k];
+        nx * gap(0) + ny * gap(1)
     }
 }
 
-/// The candidates of a kind that have a contact: index, candidate and poses.
-fn with_contact(
-    candidates: Candidates<'_>,
-    kind: PairKind,
-) -> impl Iterator<Item = (u32, &Candidate, [&PoseRow; 2])> {
-    candidates.of(kind).filter(|(_, candidate, _)| candidate.contact != NO_CONTACT)
-}
+/// Lets the contacts of a batch of jobs stay frozen whose bodies have hardly moved: their separations follow the bodies.
+/// Returns the number of points of each contact that stays frozen, and 0 for other jobs. Jobs without a contact read the
+/// last one, which never stays frozen.
+#[inline(never)]
+pub(super) fn follow<L: Lanes>(
+    lists: JobLists,
+    batch: Range<usize>,
+    poses: &[PoseRow],
+    limits: FreezeLimits,
+    (contacts, found): (&mut [Contact], &[Found]),
+) -> [f32; MOST_LANES] {
+    use quad::{ANCHORS_0, ANCHORS_1, HEADER, STATE_0, STATE_1};
+    const RECORD: usize = quad::STRIDE;
+    align_frame();
+    let (quads, found): (&mut [Quad], &[Quad]) =
+        (bytemuck::cast_slice_mut(contacts), bytemuck::cast_slice(found));
+    let none = (found.len() / STRIDE - 1) as u32;
+    let contact_of = |&i: &u32| if i == NO_CONTACT { none } else { i };
+    let [a, b, .., all] = lists.0;
+    let coming = batch.end..(batch.end + L::WIDTH).min(all.entries().len());
+    for i in all.entries()[coming].iter().map(contact_of) {
+        prefetch_quad::<STRIDE, PLACE>(found, i);
+        prefetch_records::<RECORD>(quads, [i].into_iter());
+    }
+    let mut target = [none; MOST_LANES];
+    target.iter_mut().zip(&all.entries()[batch.clone()]).for_each(|(to, i)| *to = contact_of(i));
+    let target = LaneIndex::new(&target);
+    let [room_a, room_b] = &mut [[0; MOST_LANES]; 2];
+    let bodies = [a.batch_at(batch.start, room_a), b.batch_at(batch.start, room_b)];
+    let poses = Poses::<L>::gather(poses, bodies);
+    let (zero, one, two) = (L::zero(), L::splat(1.0), L::splat(2.0).integer_bits());
+    let mut counts = [0.0; MOST_LANES];
 
-/// As [`with_contact`], with the entry of the pair in `found`, which is sorted by pair.
-fn touching<'a>(
-    candidates: Candidates<'a>,
-    kind: PairKind,
-    found: &'a [FrozenManifold],
-) -> impl Iterator<Item = (usize, &'a Candidate, [&'a PoseRow; 2], Option<&'a FrozenManifold>)> {
-    let mut found = found.iter().peekable();
-    with_contact(candidates, kind).map(move |(place, candidate, bodies)| {
-        let pair = candidate.pair();
-        while found.next_if(|f| f.pair < pair).is_some() {}
-        (place as usize, candidate, bodies, found.next_if(|f| f.pair == pair))
-    })
+    let [x, y, s_0, s_1] = L::gather_quads::<STRIDE, PLACE>(found, target);
+    let [cos_a, sin_a, cos_b, sin_b] = L::gather_quads::<STRIDE, TURNS>(found, target);
+    let ([a, b], [a_0, b_0]) = (poses.rotation, [[cos_a, sin_a], [cos_b, sin_b]]);
+    let offset = unrotate(a, poses.centers);
+    let moved = [offset[0] - x, offset[1] - y];
+    let (now, then) = (unrotate(a, b), unrotate(a_0, b_0));
+    let sine = abs(now[0] * then[1] - now[1] * then[0]);
+    let motion = (moved[0] * moved[0] + moved[1] * moved[1]).sqrt() + poses.extent * sine;
+    // Selections in turn, so that no lane with a NaN stays.
+    let turned = |p: [L; 2], q: [L; 2]| p[0] * q[0] + p[1] * q[1] - L::splat(limits.turn.cos());
+    let stays = turned(b, b_0).select_positive(one, zero);
+    let stays = turned(a, a_0).select_positive(stays, zero);
+    let mut stays = (L::splat(limits.distance) - motion).select_positive(stays, zero);
+    if !stays.any_positive() {
+        return counts;
+    }
+    let [separation_0, id_0, normal_0, tangent_0] = L::gather_quads::<RECORD, STATE_0>(quads, target);
+    let [separation_1, id_1, normal_1, tangent_1] = L::gather_quads::<RECORD, STATE_1>(quads, target);
+    if limits.loaded_only {
+        // A point that is not in use bears nothing.
+        stays = normal_0.select_positive(normal_1.select_positive(stays, zero), zero);
+        if !stays.any_positive() {
+            return counts;
+        }
+    }
+    let [nx, ny, used, _] = L::gather_quads::<RECORD, HEADER>(quads, target);
+    let turns = Turns::since([a_0, b_0], &poses);
+    let gap = |[ax, ay, bx, by]: [L; 4]| turns.gap(&poses, [nx, ny], [ax, ay], [bx, by]);
+    let new_0 = s_0 + gap(L::gather_quads::<RECORD, ANCHORS_0>(quads, target));
+    let new_1 = s_1 + gap(L::gather_quads::<RECORD, ANCHORS_1>(quads, target));
+    let new_0 = stays.select_positive(new_0, separation_0);
+    let new_1 = used.select_equal(two, stays.select_positive(new_1, separation_1), separation_1);
+    L::scatter_quads::<RECORD, STATE_0>(quads, target, [new_0, id_0, normal_0, tangent_0]);
+    L::scatter_quads::<RECORD, STATE_1>(quads, target, [new_1, id_1, normal_1, tangent_1]);
+    let count = stays.select_positive(used.select_equal(two, L::splat(2.0), one), zero);
+    counts[..L::WIDTH].copy_from_slice(bytemuck::cast_slice(&[count]));
+    counts
 }

@@ -12,7 +12,8 @@ use glam::Vec2;
 pub struct PoseRow {
     /// Center of mass and its low part: `[x, y, x_lo, y_lo]` (m).
     pub position: [f32; 4],
-    /// `[cos θ, sin θ, 1 if impulses do not move it, 0]`
+    /// `[cos θ, sin θ, 1 if impulses do not move it, extent]`: the extent is the distance of the farthest point from the
+    /// center of mass (m), 0 if the body is static.
     pub rotation: [f32; 4],
 }
 
@@ -106,6 +107,8 @@ pub struct Poses<L> {
     pub rotation: [[L; 2]; 2],
     /// 1 if impulses do not move the body (a, b), else 0.
     pub immovable: [L; 2],
+    /// The larger extent of both bodies ([`PoseRow::rotation`]) (m).
+    pub extent: L,
 }
 
 impl<L: Lanes> Poses<L> {
@@ -120,6 +123,7 @@ impl<L: Lanes> Poses<L> {
             centers: [(q[0] - p[0]) + (q[2] - p[2]), (q[1] - p[1]) + (q[3] - p[3])],
             rotation: [[r[0], r[1]], [s[0], s[1]]],
             immovable: [r[2], s[2]],
+            extent: r[3].max(s[3]),
         }
     }
 
@@ -127,15 +131,16 @@ impl<L: Lanes> Poses<L> {
     #[inline(always)]
     pub fn swapped(self) -> Self {
         let ([a, b], [immovable_a, immovable_b]) = (self.rotation, self.immovable);
-        Poses { centers: self.centers.map(|x| -x), rotation: [b, a], immovable: [immovable_b, immovable_a] }
+        let immovable = [immovable_b, immovable_a];
+        Poses { centers: self.centers.map(|x| -x), rotation: [b, a], immovable, ..self }
     }
 }
 
 impl Poses<f32> {
-    /// Poses of two bodies that impulses move.
+    /// Poses of two bodies that impulses move, without extents.
     pub fn new(a: &Pose, b: &Pose) -> Self {
         let rotation = [a.rotation.into(), b.rotation.into()];
-        Poses { centers: (b.position - a.position).into(), rotation, immovable: [0.0; 2] }
+        Poses { centers: (b.position - a.position).into(), rotation, immovable: [0.0; 2], extent: 0.0 }
     }
 }
 

@@ -139,7 +139,7 @@ impl Solver for Shim {
     }
 
     fn after_collision(&mut self, scene: &mut CollisionScene<'_>) {
-        self.rolls = scene.candidates.has_discs();
+        self.rolls = scene.has_discs;
         if scene.without.leaves_out(part::JAMS) {
             self.jams.clear();
         } else {

@@ -1,6 +1,7 @@
 //! Candidates: pairs of shapes whose bounds overlap, kept while they do.
 
 use super::World;
+use crate::bodies::BodyKind;
 use crate::contacts::pair_key;
 use crate::narrowphase::batch::{NO_CONTACT, PairKind};
 use crate::narrowphase::candidate::Candidate;
@@ -49,6 +50,14 @@ impl World {
             kept += usize::from(candidate.contact != NO_CONTACT);
             narrow.of_kind[kind as usize].push(narrow.candidates.len() as u32);
             narrow.candidates.push(candidate);
+        }
+        narrow.extents.clear();
+        narrow.extents.resize(self.bodies.len(), 0.0);
+        for (surface, &body) in self.surfaces.iter().zip(&self.shape_body) {
+            if self.bodies.kind[body as usize] != BodyKind::Static {
+                let extent = &mut narrow.extents[body as usize];
+                *extent = extent.max(surface.reach);
+            }
         }
         narrow.jobs_are_current = false;
         // A contact is removed together with its candidate.

@@ -1,16 +1,15 @@
 //! Updates contacts from candidates and carries their impulses from step to step.
 
 use super::World;
-use crate::bodies::BodyKind;
 use crate::constraints::Solver;
 use crate::constraints::step::{Collision, CollisionScene};
 use crate::contacts::Contact;
 use crate::lanes::Quad;
 use crate::narrowphase::Margins;
 use crate::narrowphase::batch::{self, Input, Jobs, NO_CONTACT, PairKind, Shapes};
-use crate::narrowphase::candidate::{Candidate, Candidates};
+use crate::narrowphase::candidate::Candidate;
 use crate::narrowphase::circles::Rolling;
-use crate::narrowphase::frozen::FrozenContacts;
+use crate::narrowphase::frozen::Found;
 use crate::narrowphase::lanes::PoseRow;
 use glam::Vec2;
 
@@ -24,17 +23,21 @@ pub(super) struct Narrow {
     pub of_kind: [Vec<u32>; PairKind::ALL.len()],
     /// Shapes as the lane kernels read them.
     pub shapes: Shapes,
+    /// Distance of the farthest point of each body from its center of mass (m), 0 if the body is static. `[bodies]`
+    pub extents: Vec<f32>,
     /// Whether the set of contacts differs from the one assigned to lanes.
     pub is_changed: bool,
     /// Whether the jobs are all candidates with their current contacts.
     pub jobs_are_current: bool,
-    pub frozen: FrozenContacts,
+    /// The poses at which each contact was found; empty if nothing is frozen. `[contacts]`
+    pub found: Vec<Found>,
     poses: Vec<PoseRow>,
     displacements: Vec<Quad>,
     jobs: [Jobs; PairKind::ALL.len()],
-    /// New contacts, in the order in which they were found.
-    fresh: Vec<Contact>,
+    /// New contacts, in the order in which they were found, and the poses at which they were.
+    fresh: Vec<(Contact, Option<Found>)>,
     last_contacts: Vec<Contact>,
+    last_found: Vec<Found>,
     /// Number of contacts after the last update.
     count: usize,
 }
@@ -65,7 +68,7 @@ impl World {
         }
         let bodies = &self.bodies;
         narrow.poses.clear();
-        narrow.poses.extend((0..bodies.len()).map(|i| PoseRow {
+        narrow.poses.extend(narrow.extents.iter().enumerate().map(|(i, &extent)| PoseRow {
             position: [
                 bodies.position_x[i],
                 bodies.position_y[i],
@@ -76,9 +79,13 @@ impl World {
                 bodies.rotation_cos[i],
                 bodies.rotation_sin[i],
                 f32::from(u8::from(!bodies.is_dynamic(i))),
-                0.0,
+                extent,
             ],
         }));
+        let freezing = self.settings.freezing();
+        if freezing.is_some() {
+            narrow.found.resize(self.contacts.len(), Found::NEVER);
+        }
         narrow.displacements.clear();
         let dt = AHEAD * self.settings.dt;
         narrow.displacements.extend((0..bodies.len()).map(|i| {
@@ -87,42 +94,38 @@ impl World {
         let mut asked = Collision::default();
         self.with_scene(|solver, scene| solver.before_collision(scene, &mut asked));
         let narrow = &mut self.narrow;
-        let reaches = self.surfaces.iter().zip(&self.shape_body).map(|(surface, &body)| {
-            let moves = self.bodies.kind[body as usize] != BodyKind::Static;
-            (body, if moves { surface.reach } else { 0.0 })
-        });
-        let Narrow { candidates, of_kind, poses, frozen, .. } = narrow;
-        let all = Candidates { all: candidates, of_kind, poses };
-        frozen.update(all, &mut self.contacts, self.settings.freezing(), reaches);
-        let mut points = narrow.list_jobs(&self.contacts);
-
-        let Narrow { candidates, jobs, fresh, is_changed, poses, displacements, shapes, .. } = narrow;
+        narrow.list_jobs(self.contacts.len());
+        let Narrow { candidates, jobs, fresh, is_changed, poses, displacements, shapes, found, .. } = narrow;
         fresh.clear();
-        let mut change = |name: u32, contact: &Contact| {
+        let mut change = |name: u32, contact: &Contact, found: Option<Found>| {
             let candidate = &mut candidates[name as usize];
             candidate.contact = if contact.manifold.count == 0 {
                 NO_CONTACT
             } else {
                 let Contact { manifold, radii, .. } = *contact;
-                fresh.push(Contact { manifold, radii, ..candidate.without_manifold() });
+                fresh.push((Contact { manifold, radii, ..candidate.without_manifold() }, found));
                 FRESH | (fresh.len() - 1) as u32
             };
             *is_changed = true;
         };
         // `displacements` covers more than a step.
         let rolling = asked.rolling.map(|Rolling { limit }| Rolling { limit: AHEAD * limit });
-        let input =
-            Input { poses, displacements, rolling, shapes, margins: Margins::of(self.settings.length_unit) };
+        let input = Input {
+            poses,
+            displacements,
+            rolling,
+            shapes,
+            margins: Margins::of(self.settings.length_unit),
+            freezing,
+        };
+        let (mut points, width, contacts) = (0, self.settings.widths()[1], &mut self.contacts);
         for (kind, jobs) in PairKind::ALL.into_iter().zip(jobs) {
-            points +=
-                batch::update(kind, self.settings.widths()[1], jobs, input, &mut self.contacts, &mut change);
+            points += batch::update(kind, width, jobs, input, contacts, found, &mut change);
         }
         if narrow.is_changed {
             narrow.sort_contacts(&mut self.contacts);
         }
         narrow.count = self.contacts.len();
-        let Narrow { candidates, of_kind, poses, frozen, .. } = narrow;
-        frozen.note(Candidates { all: candidates, of_kind, poses }, &mut self.contacts);
         let kept = &mut self.work.kept;
         kept.follow(self.solver_is.kept, &self.contacts, self.bodies.len());
         self.with_scene(|solver, scene| solver.after_collision(scene));
@@ -152,12 +155,13 @@ impl World {
 
     /// Calls a collision hook of the solver.
     fn with_scene(&mut self, hook: impl FnOnce(&mut dyn Solver, &mut CollisionScene<'_>)) {
-        let Narrow { candidates, of_kind, poses, .. } = &self.narrow;
+        let narrow = &self.narrow;
+        let mut of_kind = PairKind::ALL.into_iter().zip(&narrow.of_kind);
         let mut scene = CollisionScene {
             bodies: &self.bodies,
             contacts: &mut self.contacts,
             types: &self.work.types,
-            candidates: Candidates { all: candidates, of_kind, poses },
+            has_discs: of_kind.any(|(kind, pairs)| kind.has_disc() && !pairs.is_empty()),
             parameters: self.settings.scaled_parameters(),
             without: self.settings.without,
             gravity: Vec2::from(self.settings.gravity),
@@ -191,40 +195,24 @@ impl Narrow {
         (self.is_changed, self.count) = (true, contacts.len());
     }
 
-    /// Lists the candidates that may touch; returns the number of points of manifolds that are kept.
+    /// Lists the candidates that may touch, given the number of contacts.
     ///
     /// If most candidates do not touch, those whose centers are too far apart are skipped before their shapes
     /// are read. If most touch, the lists of the last step are reused.
-    fn list_jobs(&mut self, contacts: &[Contact]) -> usize {
-        let cull = 4 * contacts.len() < 3 * self.candidates.len();
-        if !self.frozen.keep().is_empty() {
-            self.jobs_are_current = false;
-            self.list::<true>(cull);
-            let kept = self.frozen.keep().iter().zip(&self.candidates).filter(|(keep, _)| **keep);
-            return kept.map(|(_, c)| contacts[c.contact as usize].manifold.count as usize).sum();
+    fn list_jobs(&mut self, contacts: usize) {
+        let cull = 4 * contacts < 3 * self.candidates.len();
+        if self.jobs_are_current && !cull {
+            return;
         }
-        if !self.jobs_are_current || cull {
-            self.jobs_are_current = !cull;
-            self.list::<false>(cull);
-        }
-        0
-    }
-
-    /// Fills the job lists; `KEEPS`: some manifolds may be kept.
-    fn list<const KEEPS: bool>(&mut self, cull: bool) {
-        let keep = self.frozen.keep();
+        self.jobs_are_current = !cull;
         for (jobs, names) in self.jobs.iter_mut().zip(&self.of_kind) {
             jobs.list(names, |name| {
-                let candidate = &mut self.candidates[name as usize];
+                let candidate = &self.candidates[name as usize];
                 let [a, b] = candidate.bodies.map(|body| self.poses[body as usize].position);
                 let d = [(b[0] - a[0]) + (b[2] - a[2]), (b[1] - a[1]) + (b[3] - a[3])];
-                let is_kept = KEEPS && keep[name as usize];
-                let is_near = is_kept | !cull | (d[0] * d[0] + d[1] * d[1] <= candidate.reach_squared);
-                if !is_near & (candidate.contact != NO_CONTACT) {
-                    self.is_changed = true;
-                    candidate.contact = NO_CONTACT;
-                }
-                (is_near & !is_kept, candidate.bodies, candidate.numbers, candidate.contact)
+                let is_near = d[0] * d[0] + d[1] * d[1] <= candidate.reach_squared;
+                let is_listed = is_near | !cull | (candidate.contact != NO_CONTACT);
+                (is_listed, candidate.bodies, candidate.numbers, candidate.contact)
             });
         }
     }
@@ -232,15 +220,21 @@ impl Narrow {
     /// Puts contacts in the order of their candidates, persisting and fresh ones together.
     fn sort_contacts(&mut self, contacts: &mut Vec<Contact>) {
         std::mem::swap(contacts, &mut self.last_contacts);
+        std::mem::swap(&mut self.found, &mut self.last_found);
         contacts.clear();
+        self.found.clear();
         for candidate in &mut self.candidates {
             if candidate.contact == NO_CONTACT {
                 continue;
             }
-            let from = if candidate.contact & FRESH == 0 { &self.last_contacts } else { &self.fresh };
-            let contact = from[(candidate.contact & !FRESH) as usize];
+            let from = (candidate.contact & !FRESH) as usize;
+            let (contact, found) = match candidate.contact & FRESH {
+                0 => (self.last_contacts[from], self.last_found.get(from).copied()),
+                _ => self.fresh[from],
+            };
             candidate.contact = contacts.len() as u32;
             contacts.push(contact);
+            self.found.extend(found);
         }
         self.jobs_are_current = false;
     }

@@ -13,7 +13,7 @@ use crate::bodies::{Bodies, BodyDef};
 use crate::constraints::records::kept::SolverState;
 use crate::contacts::Contact;
 use crate::lanes::LaneWidth;
-use crate::narrowphase::frozen::FrozenContacts;
+use crate::narrowphase::frozen::Found;
 use crate::shapes::{MassProperties, Shape};
 use crate::solvers::{self, Variant};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -64,7 +64,7 @@ struct SavedWorld {
     impulses_of: Option<f32>,
     kept: SolverState,
     #[serde(default)]
-    frozen: FrozenContacts,
+    found: Vec<Found>,
     applied: Vec<StandingForces>,
     events: Events,
     traits: Traits,
@@ -89,7 +89,7 @@ impl Serialize for World {
             contacts: self.contacts.clone(),
             impulses_of: self.impulses_of,
             kept: self.work.kept.clone(),
-            frozen: self.narrow.frozen.clone(),
+            found: self.narrow.found.clone(),
             applied: self.applied.clone(),
             events: self.events.clone(),
             traits: self.traits,
@@ -146,6 +146,9 @@ impl SavedWorld {
         if !self.kept.is_consistent() {
             return Err("kept: as many numbers as names".into());
         }
+        if !self.found.is_empty() && self.found.len() != self.contacts.len() {
+            return Err(format!("found: {} entries for {} contacts", self.found.len(), self.contacts.len()));
+        }
         let is_body = |&i: &u32| (i as usize) < n;
         let mut named = s.free.iter().chain(&s.removed);
         if !named.all(is_body) || !self.applied.iter().all(|standing| is_body(&standing.body)) {
@@ -182,7 +185,7 @@ impl SavedWorld {
         (world.step_index, world.traits) = (self.step_index, self.traits);
         world.features = world.traits.features();
         (world.applied, world.events, world.impulses_of) = (self.applied, self.events, self.impulses_of);
-        world.narrow.frozen = self.frozen;
+        world.narrow.found = self.found;
         if self.kept.size() == world.solver_is.kept {
             world.work.kept = self.kept;
         }

@@ -5,7 +5,6 @@ use crate::bodies::Bodies;
 use crate::constraints::kernels::types::ConstraintSet;
 use crate::constraints::records::graph::Graph;
 use crate::contacts::Contact;
-use crate::narrowphase::candidate::Candidates;
 use crate::narrowphase::circles::Rolling;
 use crate::params::{Parameters, Without};
 use glam::Vec2;
@@ -59,8 +58,8 @@ pub struct CollisionScene<'a> {
     pub contacts: &'a mut [Contact],
     /// Constraints of other types than contacts.
     pub types: &'a [ConstraintSet],
-    /// Pairs of shapes that may touch.
-    pub candidates: Candidates<'a>,
+    /// Whether a pair of shapes that may touch has a disc.
+    pub has_discs: bool,
     /// The solver's own parameters.
     pub parameters: Parameters,
     /// Mechanisms of the solver that are left out.
