@@ -349,8 +349,8 @@ fn run_kernel<L: Lanes>(
 
 /// Writes manifolds into contacts. A point keeps the impulses of the old point with the same feature id.
 ///
-/// Integers are moved and compared as the bits of floats: numbers below 2²³ with equal bits are equal (tiny)
-/// floats. The id of an unused old point is NaN, which equals nothing.
+/// Integers below 2²³ are moved and compared as bits. The id of an unused old point is the bits of NaN, which no
+/// integer below 2²³ has.
 ///
 /// No two lanes may have the same target.
 #[inline(always)]
