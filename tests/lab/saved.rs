@@ -43,8 +43,10 @@ fn what_does_not_fit_together_is_refused() {
     };
     assert_eq!(read(&|_| {}), Ok(()));
     type Change = dyn Fn(&mut serde_json::Value);
-    let cases: [(&Change, &str); 7] = [
+    let cases: [(&Change, &str); 9] = [
         (&|v| v["settings"]["solver"] = "nobody".into(), "unknown solver 'nobody'"),
+        (&|v| v["settings"]["dt"] = 0.into(), "settings.dt: must be positive and finite, is 0"),
+        (&|v| v["settings"]["budget"]["substeps"] = 0.into(), "settings.budget.substeps: must be at least 1"),
         (&|v| v["settings"]["lanes"] = 5.into(), "5 lanes"),
         (&|v| v["bodies"]["group"] = serde_json::json!([1]), "other lengths"),
         (&|v| v["contacts"][0]["body_a"] = 1000.into(), "contacts[0]"),

@@ -110,6 +110,7 @@ impl<'de> Deserialize<'de> for World {
 impl SavedWorld {
     /// Whether all arrays have matching lengths and all indices are valid.
     fn check(&mut self) -> Result<(), String> {
+        self.settings.check().map_err(|e| e.within("settings").to_string())?;
         let (n, shapes) = (self.bodies.len(), self.shapes.len());
         let floats = self.bodies.arrays_mut().map(|array| array.len());
         let (b, s) = (&self.bodies, &self.slots);
