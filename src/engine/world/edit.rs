@@ -96,6 +96,7 @@ impl World {
         }
         self.fat_boxes.set(index, first, &self.shapes[first..first + count as usize]);
         self.traits.add(body, self.bodies.round[index]);
+        self.seams_are_stale |= body.kind == BodyKind::Static;
         self.features = self.traits.features();
         (self.pairs_are_stale, self.continuous_is_stale, self.lanes_are_for) = (true, true, None);
         Ok(BodyHandle { index: index as u32, generation: self.slots.generation[index] })
@@ -168,6 +169,7 @@ impl World {
             return Err(Error::invalid(format!("body {i}"), "has constraints of another type than contacts"));
         }
         self.remove_joints_of(body);
+        self.seams_are_stale |= self.bodies.kind[i] == BodyKind::Static;
         let nothing = BodyDef::fixed([0.0; 2]);
         self.bodies.set(i, &nothing, &MassProperties::ZERO);
         let slots = &mut self.slots;
@@ -235,6 +237,7 @@ impl World {
         let center = self.bodies.local_center[i].as_dvec2().to_array();
         self.bodies.place(i, position, angle, center);
         self.fat_boxes.forget(i);
+        self.seams_are_stale |= self.bodies.kind[i] == BodyKind::Static;
         Ok(())
     }
 

@@ -16,6 +16,7 @@ use crate::continuous::{Continuous, Moving};
 use crate::lanes::LaneWidth;
 use crate::narrowphase::Margins;
 use crate::narrowphase::lanes::{Class, PoseRow};
+use crate::narrowphase::seams::Seams;
 use crate::params::DIVERGED_SPEED;
 use crate::shapes::Shape;
 use crate::solvers::{self, Variant};
@@ -115,6 +116,9 @@ pub struct World {
     pairs: Vec<[u32; 2]>,
     pairs_are_stale: bool,
     narrow: Narrow,
+    seams: Seams,
+    /// Whether static bodies came, went or were moved since `seams` were found.
+    seams_are_stale: bool,
     assignment: Assignment,
     continuous: Continuous,
     /// Whether bodies were added or removed since `continuous` was built.
@@ -166,6 +170,8 @@ impl World {
             pairs: Vec::new(),
             pairs_are_stale: true,
             narrow: Narrow::default(),
+            seams: Seams::default(),
+            seams_are_stale: true,
             assignment: Assignment::default(),
             continuous: Continuous::default(),
             continuous_is_stale: true,

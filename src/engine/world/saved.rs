@@ -1,8 +1,7 @@
 //! Serialization of a world: the state at the start of a step, without values that the step recomputes.
 //!
-//! Not saved: constraints of the caller's own types (a world with any is an error), and state that a solver
-//! keeps in its own fields instead of per contact and body. Solvers without such fields continue
-//! bit-identically.
+//! Not saved: constraints of the caller's own types (a world with any is an error), and the piles and jams of `shim` and
+//! `soft_block`. All other solvers continue bit-identically.
 
 use super::edit::{Slots, StandingForces};
 use super::events::Events;
@@ -63,6 +62,9 @@ struct SavedWorld {
     contacts: Vec<Contact>,
     impulses_of: Option<f32>,
     kept: SolverState,
+    /// [`Solver::kept`](crate::constraints::Solver::kept)
+    #[serde(default)]
+    of_solver: Vec<f64>,
     #[serde(default)]
     frozen: FrozenContacts,
     applied: Vec<StandingForces>,
@@ -89,6 +91,7 @@ impl Serialize for World {
             contacts: self.contacts.clone(),
             impulses_of: self.impulses_of,
             kept: self.work.kept.clone(),
+            of_solver: self.solver.kept(),
             frozen: self.narrow.frozen.clone(),
             applied: self.applied.clone(),
             events: self.events.clone(),
@@ -187,6 +190,7 @@ impl SavedWorld {
         if self.kept.size() == world.solver_is.kept {
             world.work.kept = self.kept;
         }
+        world.solver.set_kept(&self.of_solver);
         self.joints.restore(&mut world);
         world.update_pairs();
         world.contacts = self.contacts;
