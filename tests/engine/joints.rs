@@ -144,7 +144,8 @@ fn joints_that_begin_apart_are_pushed_together_at_a_bounded_speed() {
         }
         let gap = world.joint_state(hinge).unwrap().gap;
         // `physx` bounds pushes at 1 km/s, as its source does; `avbd` removes old errors over seconds.
-        let is_bounded = solver.name == "physx" || fastest[0] < f64::from(MAX_PUSH_SPEED) && fastest[1] < 10.0;
+        let is_bounded =
+            solver.name == "physx" || fastest[0] < f64::from(MAX_PUSH_SPEED) && fastest[1] < 10.0;
         let closes = solver.name == "avbd" || gap < 0.02;
         assert!(is_bounded && closes, "{}: {fastest:?} m/s, rad/s, gap {gap} m", solver.name);
         assert!(motion(&world)[2..].iter().all(|x| x.abs() < 5e-3), "{}: {:?}", solver.name, motion(&world));
@@ -154,11 +155,13 @@ fn joints_that_begin_apart_are_pushed_together_at_a_bounded_speed() {
 /// Free bodies at rest whose anchors are apart, and every joint that springs a point to a point (box2d 487).
 #[test]
 fn joints_between_free_bodies_give_no_momentum() {
-    let holds = |solver: &&Variant| solver.joints_unsupported.is_none() && solver.promises(Guarantee::Momentum);
+    let holds =
+        |solver: &&Variant| solver.joints_unsupported.is_none() && solver.promises(Guarantee::Momentum);
     for solver in VARIANTS.into_iter().filter(holds) {
         for kind in 0..3 {
             let mut world = World::new(Settings { gravity: [0.0; 2], ..Settings::new(solver) });
-            let body = |at: [f64; 2], half: f32| BodyDef::dynamic(at).with(ShapeDef::rectangle(half, 0.5).unwrap());
+            let body =
+                |at: [f64; 2], half: f32| BodyDef::dynamic(at).with(ShapeDef::rectangle(half, 0.5).unwrap());
             let a = world.add_body(&body([0.0; 2], 1.0)).unwrap();
             let b = world.add_body(&body([3.0, 1.0], 0.5).with_angle(0.5)).unwrap();
             let joint = match kind {

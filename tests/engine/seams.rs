@@ -27,7 +27,13 @@ fn sliders() -> [(ShapeDef, f64); 3] {
 
 /// Slides a shape at 1 m/s along ground that is turned by `angle` together with gravity. Returns the least speed along the
 /// ground and the largest height over its start (m), and the speed at the end.
-fn slide(solver: &str, ground: &[BodyDef], (shape, height): &(ShapeDef, f64), angle: f64, steps: u32) -> [f64; 3] {
+fn slide(
+    solver: &str,
+    ground: &[BodyDef],
+    (shape, height): &(ShapeDef, f64),
+    angle: f64,
+    steps: u32,
+) -> [f64; 3] {
     let gravity = turned([0.0, -10.0], angle).map(|x| x as f32);
     let mut world = World::new(Settings { gravity, ..Settings::new(find(solver).unwrap()) });
     for body in ground {
@@ -49,8 +55,13 @@ fn slide(solver: &str, ground: &[BodyDef], (shape, height): &(ShapeDef, f64), an
 /// Ground of lines of 0.4 m, and of tiles of 0.4 m.
 fn pieces(friction: f64) -> [Vec<BodyDef>; 2] {
     let ends = (0..10).map(|i| -2.6 + 0.4 * f64::from(i));
-    let lines = BodyDef { shapes: ends.clone().map(|x| line([x, 0.0], [x + 0.4, 0.0], friction)).collect(), ..BodyDef::fixed([0.0; 2]) };
-    let tile = |x: f64| BodyDef::fixed([x + 0.2, -0.2]).with(ShapeDef::rectangle(0.2, 0.2).unwrap().with_friction(friction));
+    let lines = BodyDef {
+        shapes: ends.clone().map(|x| line([x, 0.0], [x + 0.4, 0.0], friction)).collect(),
+        ..BodyDef::fixed([0.0; 2])
+    };
+    let tile = |x: f64| {
+        BodyDef::fixed([x + 0.2, -0.2]).with(ShapeDef::rectangle(0.2, 0.2).unwrap().with_friction(friction))
+    };
     [vec![lines], ends.map(tile).collect()]
 }
 
@@ -98,10 +109,10 @@ fn shapes_go_round_corners() {
         let slope: f64 = 0.3;
         let ground = BodyDef::fixed([0.0; 2]).with(line([-9.0, 0.0], [0.0, 0.0], 0.0));
         let ground = ground.with(line([0.0, 0.0], [4.0, 4.0 * slope.tan()], 0.0));
-        let mut world =
-            World::new(Settings { gravity: [0.0; 2], ..Settings::new(find(solver).unwrap()) });
+        let mut world = World::new(Settings { gravity: [0.0; 2], ..Settings::new(find(solver).unwrap()) });
         world.add_body(&ground).unwrap();
-        let disc = BodyDef::dynamic([-1.0, 0.2]).with_velocity([1.0, 0.0]).with(ShapeDef::circle(0.2).unwrap());
+        let disc =
+            BodyDef::dynamic([-1.0, 0.2]).with_velocity([1.0, 0.0]).with(ShapeDef::circle(0.2).unwrap());
         let disc = world.add_body(&disc).unwrap().index();
         (0..120).for_each(|_| world.step().unwrap());
         let speed = f64::from(world.bodies.velocity(disc).length());
@@ -113,9 +124,11 @@ fn shapes_go_round_corners() {
 #[test]
 fn walls_stop_what_comes() {
     for solver in SOLVERS {
-        let lines = BodyDef::fixed([0.0; 2])
-            .with(line([-9.0, 0.0], [0.0, 0.0], 0.0))
-            .with(line([0.0, 0.0], [0.0, 3.0], 0.0));
+        let lines = BodyDef::fixed([0.0; 2]).with(line([-9.0, 0.0], [0.0, 0.0], 0.0)).with(line(
+            [0.0, 0.0],
+            [0.0, 3.0],
+            0.0,
+        ));
         for (k, slider) in sliders().iter().enumerate() {
             let half = [0.4, 0.5, 0.2][k];
             let mut world = World::new(Settings::new(find(solver).unwrap()));

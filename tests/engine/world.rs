@@ -62,9 +62,15 @@ fn settings_out_of_range_are_refused_with_their_field_and_change_nothing() {
         (Settings { dt: f32::NAN, ..own() }, "dt: must be positive and finite, is NaN"),
         (Settings { length_unit: 0.0, ..own() }, "length_unit: must be positive and finite, is 0.0"),
         (Settings { length_unit: f32::NAN, ..own() }, "length_unit: must be positive and finite, is NaN"),
-        (Settings { gravity: [0.0, f32::INFINITY], ..own() }, "gravity[1]: must be finite in 32 bits, is inf"),
+        (
+            Settings { gravity: [0.0, f32::INFINITY], ..own() },
+            "gravity[1]: must be finite in 32 bits, is inf",
+        ),
         (substeps(0), "budget.substeps: must be at least 1 and leave a substep of dt, is 0"),
-        (Settings { frozen: Freezing::Within(limits), ..own() }, "frozen.distance: must not be negative, is -1.0"),
+        (
+            Settings { frozen: Freezing::Within(limits), ..own() },
+            "frozen.distance: must not be negative, is -1.0",
+        ),
         (Settings { parameters, ..own() }, "parameters.contact_hertz: NaN is not within 0.001 to 1000000 Hz"),
     ];
     for variant in VARIANTS {
@@ -86,7 +92,8 @@ fn settings_out_of_range_are_refused_with_their_field_and_change_nothing() {
 
 #[test]
 fn what_is_written_to_arrays_takes_effect() {
-    let disc = |x: i32| BodyDef::dynamic([x.into(), 0.0]).with(ShapeDef::circle(0.5).unwrap().with_friction(0.0));
+    let disc =
+        |x: i32| BodyDef::dynamic([x.into(), 0.0]).with(ShapeDef::circle(0.5).unwrap().with_friction(0.0));
     let mut world = world("soft_step");
     let bodies = [0, 2, 4, 6].map(|x| world.add_body(&disc(x)).unwrap().index());
     world.step().unwrap();

@@ -83,7 +83,8 @@ impl Seams {
         let mut ends: Vec<(usize, Vec2, [f64; 2], [Vec2; 2])> = Vec::new();
         for shape in (0..shapes.len()).filter(|&shape| is_ground(shape)) {
             let body = shape_body[shape] as usize;
-            let ([x, y], (all, count)) = (bodies.center(body), corners(&shapes[shape], bodies.pose(body).rotation));
+            let ([x, y], (all, count)) =
+                (bodies.center(body), corners(&shapes[shape], bodies.pose(body).rotation));
             for (i, &corner) in all[..count].iter().enumerate() {
                 let at = [x + f64::from(corner.x), y + f64::from(corner.y)];
                 let way = |other: usize| (all[other % count] - corner).normalize_or_zero();
@@ -126,7 +127,8 @@ impl Seams {
     /// Whether a contact meets an end of the ground where another piece goes on.
     pub fn is_ghost(&self, contact: &Contact, bodies: &Bodies, shapes: &[Shape], margins: Margins) -> bool {
         let n = contact.manifold.normal;
-        let mut seams = self.of(contact.shape_a).iter().filter(|seam| n.dot(seam.way) > IN_THE_WAY).peekable();
+        let mut seams =
+            self.of(contact.shape_a).iter().filter(|seam| n.dot(seam.way) > IN_THE_WAY).peekable();
         if seams.peek().is_none() {
             return false;
         }

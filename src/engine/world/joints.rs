@@ -287,7 +287,9 @@ impl World {
 
     /// Removes all joints of a body.
     pub(super) fn remove_joints_of(&mut self, body: BodyHandle) {
-        while let Some(&[_, joint]) = self.joints.of_body.range([body.index, 0]..=[body.index, u32::MAX]).next() {
+        while let Some(&[_, joint]) =
+            self.joints.of_body.range([body.index, 0]..=[body.index, u32::MAX]).next()
+        {
             self.joints.remove(joint as usize);
             self.joints_changed();
         }
