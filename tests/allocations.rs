@@ -3,8 +3,10 @@
 #[path = "lab/common.rs"]
 mod common;
 
+use simpulse::engine::bodies::{BodyDef, ShapeDef};
+use simpulse::engine::joints::Joint;
 use simpulse::engine::solvers::{Guarantee, VARIANTS, find};
-use simpulse::engine::world::Settings;
+use simpulse::engine::world::{Settings, World};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -13,6 +15,8 @@ struct Counting;
 
 thread_local! {
     static COUNT: Cell<usize> = const { Cell::new(0) };
+    /// Bytes allocated, and bytes freed.
+    static BYTES: Cell<[usize; 2]> = const { Cell::new([0; 2]) };
 }
 
 // SAFETY: every call is passed to the system allocator unchanged.
@@ -20,11 +24,13 @@ thread_local! {
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         COUNT.with(|c| c.set(c.get() + 1));
+        BYTES.with(|b| b.set([b.get()[0] + layout.size(), b.get()[1]]));
         // SAFETY: the caller's promise is passed on.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        BYTES.with(|b| b.set([b.get()[0], b.get()[1] + layout.size()]));
         // SAFETY: the caller's promise is passed on.
         unsafe { System.dealloc(pointer, layout) }
     }
@@ -86,4 +92,43 @@ fn a_steady_step_with_events_allocates_nothing() {
         }
     });
     assert_eq!(count, 0);
+}
+
+/// A world without gravity, so that nothing meets.
+fn empty() -> World {
+    World::new(Settings { gravity: [0.0; 2], ..common::settings(find("soft_step").unwrap()) })
+}
+
+#[test]
+fn shapes_that_come_and_go_leave_no_memory_behind() {
+    let mut world = empty();
+    let mut live = [0; 2];
+    for round in 0..4000 {
+        let shape = ShapeDef::circle(0.1 + 1e-4 * round as f32).unwrap();
+        let body = world.add_body(&BodyDef::dynamic([0.0; 2]).with(shape)).unwrap();
+        world.step().unwrap();
+        world.remove_body(body).unwrap();
+        if [999, 3999].contains(&round) {
+            let [allocated, freed] = BYTES.with(Cell::get);
+            live[usize::from(round > 999)] = allocated - freed;
+        }
+    }
+    assert!(live[1] <= live[0], "{} bytes more", live[1] - live[0]);
+}
+
+#[test]
+fn removing_a_body_costs_the_same_whatever_joints_others_have() {
+    let cost = |pairs: usize| {
+        let mut world = empty();
+        let body = BodyDef::dynamic([0.0; 2]).with(ShapeDef::circle(0.5).unwrap());
+        let bodies: Vec<_> = (0..2 * pairs).map(|_| world.add_body(&body).unwrap()).collect();
+        for pair in bodies.chunks_exact(2) {
+            world.add_joint(&Joint::revolute(pair[0], pair[1])).unwrap();
+        }
+        world.find_contacts();
+        let before = BYTES.with(Cell::get)[0];
+        world.remove_body(bodies[0]).unwrap();
+        BYTES.with(Cell::get)[0] - before
+    };
+    assert_eq!(cost(1000), cost(50));
 }

@@ -106,7 +106,7 @@ struct RunResult {
 /// A note about bodies whose size is far from the length unit.
 fn size_note(world: &World) -> Option<String> {
     let dynamic = |pair: &(_, &u32)| world.bodies.is_dynamic(*pair.1 as usize);
-    let shapes = world.shapes.iter().zip(&world.shape_body).filter(dynamic);
+    let shapes = world.shapes().iter().zip(world.shape_body()).filter(dynamic);
     let widths = shapes.map(|(shape, _)| 2.0 * shape.min_half_extent());
     let mut widths: Vec<f32> = widths.filter(|width| width.is_finite()).collect();
     widths.sort_by(f32::total_cmp);

@@ -18,7 +18,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use crate::engine::world::{Divergence, Settings, World};
+use crate::engine::world::{Divergence, Settings, StepError, World};
 use crate::lab::error::Error;
 use crate::lab::interned::{self, Name};
 use crate::lab::metrics::{Errors, Observation};
@@ -93,7 +93,7 @@ impl<'a> Trial<'a> {
             if step + measured >= steps {
                 observation.get_or_insert_with(|| Observation::new(&world));
             }
-            failure = world.step().err();
+            failure = world.step().err().and_then(StepError::divergence);
             if failure.is_some() {
                 break;
             }

@@ -11,6 +11,7 @@ mod narrowphase;
 mod observe;
 mod random;
 mod rows;
+mod seams;
 mod shapes;
 mod soundness;
 mod structure;

@@ -4,7 +4,8 @@ use simpulse::engine::bodies::{BodyDef, BodyHandle, ShapeDef};
 use simpulse::engine::broadphase::BroadPhaseKind;
 use simpulse::engine::error::Error;
 use simpulse::engine::lanes::FUSED;
-use simpulse::engine::params::HIT_SPEED;
+use simpulse::engine::narrowphase::frozen::{FreezeLimits, Freezing};
+use simpulse::engine::params::{Budget, HIT_SPEED};
 use simpulse::engine::solvers::{self, VARIANTS};
 use simpulse::engine::world::{ContactEvent, Settings, World};
 
@@ -44,8 +45,94 @@ fn values_out_of_range_are_refused_with_their_place() {
     for (body, message) in cases {
         let mut world = world("pgs");
         assert_eq!(world.add_body(&body).unwrap_err().to_string(), message);
-        assert_eq!((world.bodies.len(), world.shapes.len()), (0, 0));
+        assert_eq!((world.bodies.len(), world.shapes().len()), (0, 0));
     }
+}
+
+#[test]
+fn settings_out_of_range_are_refused_with_their_field_and_change_nothing() {
+    let own = || Settings::new(solvers::find("soft_step").unwrap());
+    let substeps = |substeps| Settings { budget: Budget { substeps, ..own().budget }, ..own() };
+    let mut parameters = own().parameters;
+    parameters[own().solver.parameter("contact_hertz").unwrap()] = f32::NAN;
+    let limits = FreezeLimits { distance: -1.0, ..FreezeLimits::BOX2D };
+    let cases = [
+        (Settings { dt: 0.0, ..own() }, "dt: must be positive and finite, is 0.0"),
+        (Settings { dt: -0.1, ..own() }, "dt: must be positive and finite, is -0.1"),
+        (Settings { dt: f32::NAN, ..own() }, "dt: must be positive and finite, is NaN"),
+        (Settings { length_unit: 0.0, ..own() }, "length_unit: must be positive and finite, is 0.0"),
+        (Settings { length_unit: f32::NAN, ..own() }, "length_unit: must be positive and finite, is NaN"),
+        (
+            Settings { gravity: [0.0, f32::INFINITY], ..own() },
+            "gravity[1]: must be finite in 32 bits, is inf",
+        ),
+        (substeps(0), "budget.substeps: must be at least 1 and leave a substep of dt, is 0"),
+        (
+            Settings { frozen: Freezing::Within(limits), ..own() },
+            "frozen.distance: must not be negative, is -1.0",
+        ),
+        (Settings { parameters, ..own() }, "parameters.contact_hertz: NaN is not within 0.001 to 1000000 Hz"),
+    ];
+    for variant in VARIANTS {
+        let mut world = world(variant.name);
+        ground(&mut world);
+        world.add_body(&unit_box([0.0, 0.5])).unwrap();
+        let _ = world.step();
+        let (good, hash) = (world.settings.clone(), world.state_hash());
+        for (bad, message) in &cases {
+            world.settings = bad.clone();
+            world.find_contacts();
+            assert_eq!(world.step().unwrap_err().to_string(), *message);
+        }
+        world.settings = good;
+        assert_eq!((world.state_hash(), world.step_index), (hash, 1), "{}", variant.name);
+        world.step().unwrap_or_else(|e| panic!("{}: {e}", variant.name));
+    }
+}
+
+#[test]
+fn what_is_written_to_arrays_takes_effect() {
+    let disc =
+        |x: i32| BodyDef::dynamic([x.into(), 0.0]).with(ShapeDef::circle(0.5).unwrap().with_friction(0.0));
+    let mut world = world("soft_step");
+    let bodies = [0, 2, 4, 6].map(|x| world.add_body(&disc(x)).unwrap().index());
+    world.step().unwrap();
+    let speed = world.bodies.velocity_y[0];
+    world.bodies.angular_velocity[bodies[0]] = 2.0;
+    world.bodies.torque[bodies[1]] = 1.0;
+    world.bodies.linear_damping[bodies[2]] = 1e3;
+    for _ in 0..30 {
+        world.step().unwrap();
+    }
+    let b = &world.bodies;
+    assert!((b.angle(bodies[0]) - 1.0).abs() < 1e-4, "half a second at 2 rad/s: {}", b.angle(bodies[0]));
+    let spin = 0.5 * b.inv_inertia[bodies[1]];
+    assert!((b.angular_velocity[bodies[1]] - spin).abs() < 1e-4 * spin, "{}", b.angular_velocity[bodies[1]]);
+    assert!(b.velocity_y[bodies[2]].abs() < 0.1 && b.velocity_y[bodies[3]] < speed - 4.9);
+}
+
+#[test]
+fn a_group_is_changed_between_steps() {
+    let mut world = world("soft_step");
+    let floor = ground(&mut world);
+    let body = world.add_body(&unit_box([0.0, 0.5])).unwrap();
+    world.step().unwrap();
+    assert_eq!(world.contacts.len(), 1);
+    world.set_group(floor, 3).and(world.set_group(body, 3)).unwrap();
+    world.step().unwrap();
+    assert_eq!((world.contacts.len(), world.bodies.group(body.index())), (0, 3));
+    world.set_group(body, 0).unwrap();
+    world.step().unwrap();
+    assert_eq!(world.contacts.len(), 1);
+}
+
+#[test]
+fn a_handle_is_of_one_world_only() {
+    let [mut one, mut other] = [world("soft_step"), world("soft_step")];
+    let bodies = [&mut one, &mut other].map(|world| world.add_body(&unit_box([0.0, 0.5])).unwrap());
+    assert!(one.contains(bodies[0]) && !one.contains(bodies[1]) && !other.contains(bodies[0]));
+    assert!(one.clone().contains(bodies[0]));
+    assert_eq!(one.set_velocity(bodies[1], [1.0, 0.0], 0.0).unwrap_err().to_string(), "body 0 was removed");
 }
 
 #[test]
@@ -249,6 +336,7 @@ fn rays_end_where_points_are_inside() {
             assert!((hit.normal.length() - 1.0).abs() < 1e-6 && slope > 0.0);
             if slope > 0.1 && end > 0.0 {
                 assert!(inside(end + 1e-4).contains(&hit.body), "{from:?} {along:?} {hit:?}");
+                assert!(queries.ray_cast_where(from, along, f64::NAN, |_| true).is_err());
                 let short = queries.ray_cast_where(from, along, 0.999 * end, |_| true).unwrap();
                 assert_eq!(short, None);
                 let other = queries.ray_cast_where(from, along, 100.0, |body| body != hit.body).unwrap();

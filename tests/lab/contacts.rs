@@ -15,13 +15,13 @@ use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 fn from_nothing(world: &World, last: &[Contact]) -> Vec<Contact> {
     let bodies = &world.bodies;
     let proxies: Vec<Proxy> = world
-        .shapes
+        .shapes()
         .iter()
-        .zip(&world.shape_body)
+        .zip(world.shape_body())
         .map(|(shape, &body)| Proxy {
             aabb: shape.aabb(&bodies.pose(body as usize)).grown(SPECULATIVE_DISTANCE),
             body,
-            group: bodies.group[body as usize],
+            group: bodies.group(body as usize),
             dynamic: bodies.is_dynamic(body as usize),
         })
         .collect();
@@ -31,9 +31,9 @@ fn from_nothing(world: &World, last: &[Contact]) -> Vec<Contact> {
     for [i, j] in pairs.filter(|&[i, j]| proxies[i].may_touch(&proxies[j])).map(|pair| pair.map(|i| i as u32))
     {
         let (a, b) = if proxies[j as usize].dynamic { (i, j) } else { (j, i) };
-        let [body_a, body_b] = [a, b].map(|shape| world.shape_body[shape as usize]);
+        let [body_a, body_b] = [a, b].map(|shape| world.shape_body()[shape as usize]);
         let [pose_a, pose_b] = bodies.relative_poses(body_a as usize, body_b as usize);
-        let [shape_a, shape_b] = [a, b].map(|shape| &world.shapes[shape as usize]);
+        let [shape_a, shape_b] = [a, b].map(|shape| &world.shapes()[shape as usize]);
         // Motion of the bodies over 1.25 steps.
         let ways = [body_a, body_b].map(|body| {
             let (v, dt) = (bodies.velocity(body as usize), 1.25 * world.settings.dt);

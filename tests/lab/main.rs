@@ -9,6 +9,7 @@ mod continuous;
 mod converge;
 mod elastic;
 mod features;
+mod flush_to_zero;
 mod golden;
 mod impulses;
 mod invariance;

@@ -193,15 +193,15 @@ fn the_deepest_overlap_is_found_where_bodies_first_meet() {
 /// Deepest overlap of discs with each other and with boxes and lines that do not turn (m).
 fn overlap(world: &World) -> f64 {
     use simpulse::engine::shapes::Shape;
-    let disc = |s: usize| match world.shapes[s] {
-        Shape::Circle { radius, .. } => Some((world.bodies.center(world.shape_body[s] as usize), radius)),
+    let disc = |s: usize| match world.shapes()[s] {
+        Shape::Circle { radius, .. } => Some((world.bodies.center(world.shape_body()[s] as usize), radius)),
         _ => None,
     };
     let mut deepest = 0.0_f64;
-    for a in 0..world.shapes.len() {
+    for a in 0..world.shapes().len() {
         let Some(([ax, ay], radius)) = disc(a) else { continue };
         let radius = f64::from(radius);
-        for b in 0..world.shapes.len() {
+        for b in 0..world.shapes().len() {
             if a == b {
                 continue;
             }
@@ -210,9 +210,9 @@ fn overlap(world: &World) -> f64 {
                 continue;
             }
             // The nearest point of an upright box or a level line. No center is inside one.
-            let [bx, by] = world.bodies.center(world.shape_body[b] as usize);
+            let [bx, by] = world.bodies.center(world.shape_body()[b] as usize);
             let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-            world.shapes[b].for_each_vertex(|v| {
+            world.shapes()[b].for_each_vertex(|v| {
                 let v = [bx + f64::from(v.x), by + f64::from(v.y)];
                 (0..2).for_each(|k| (low[k], high[k]) = (low[k].min(v[k]), high[k].max(v[k])));
             });

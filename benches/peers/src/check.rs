@@ -69,7 +69,7 @@ impl Checker {
     pub fn new(Loaded { scene, truth, .. }: Loaded) -> Result<Self, String> {
         let settings = Settings::new(solvers::find("soft_step").map_err(|e| e.to_string())?);
         let mirror = scene.build(settings).map_err(|e| e.to_string())?;
-        let shapes = mirror.shapes.iter().zip(&mirror.shape_body);
+        let shapes = mirror.shapes().iter().zip(mirror.shape_body());
         let half_extent = shapes
             .filter(|&(_, &body)| mirror.bodies.is_dynamic(body as usize))
             .map(|(shape, _)| f64::from(shape.min_half_extent()))
@@ -137,7 +137,7 @@ impl Checker {
         self.pairs.find(world, |pair, _| {
             let [(a, pose_a), (b, pose_b)] = pair.map(|s| {
                 let s = s as usize;
-                (&world.shapes[s], world.bodies.pose(world.shape_body[s] as usize))
+                (&world.shapes()[s], world.bodies.pose(world.shape_body()[s] as usize))
             });
             let apart = distance(a, &pose_a, b, &pose_b).distance;
             let cores = if apart > 0.0 { apart } else { -penetration(a, &pose_a, b, &pose_b).depth };

@@ -265,7 +265,7 @@ pub(crate) fn finite_pair(place: &str, value: [f64; 2]) -> Result<(), Error> {
     }
 }
 
-fn not_negative(place: &str, value: f64) -> Result<(), Error> {
+pub(crate) fn not_negative(place: &str, value: f64) -> Result<(), Error> {
     finite(place, value)?;
     if value >= 0.0 {
         return Ok(());

@@ -27,7 +27,7 @@ pub enum BodyKind {
 ///
 /// A handle stays valid until its body is removed, whatever else is added or removed. The index of a removed
 /// body may be reused. The generation distinguishes the two, so an old handle gives an error and never refers
-/// to another body.
+/// to another body. Nor does the handle of another world, other than its clones and saved copies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BodyHandle {
@@ -82,15 +82,15 @@ pub struct Bodies {
     /// Angular damping (1/s).
     pub angular_damping: LaneVec,
     /// From the body's origin to its center of mass, body axes (m).
-    pub local_center: Vec<Vec2>,
+    pub(crate) local_center: Vec<Vec2>,
     /// How each body moves.
     pub kind: Vec<BodyKind>,
     /// Collision group of each body; 0 is none.
-    pub group: Vec<i32>,
+    pub(crate) group: Vec<i32>,
     /// Whether dynamic bodies also stop it in continuous collision.
     pub bullet: Vec<bool>,
     /// Whether a body consists of discs about its center of mass, so that rotating it moves no contact.
-    pub round: Vec<bool>,
+    pub(crate) round: Vec<bool>,
 }
 
 impl Bodies {
@@ -237,6 +237,16 @@ impl Bodies {
     /// Angle of body `i` in (−π, π] (rad).
     pub fn angle(&self, i: usize) -> f32 {
         self.rotation_sin[i].atan2(self.rotation_cos[i])
+    }
+
+    /// From the origin of body `i` to its center of mass, body axes (m).
+    pub fn local_center(&self, i: usize) -> Vec2 {
+        self.local_center[i]
+    }
+
+    /// Collision group of body `i`; 0 is none. See [`World::set_group`](crate::world::World::set_group).
+    pub fn group(&self, i: usize) -> i32 {
+        self.group[i]
     }
 
     /// Whether body `i` is moved by impulses.

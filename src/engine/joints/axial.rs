@@ -11,7 +11,7 @@ use crate::lanes::Lanes;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Spring {
-    /// Natural frequency of the two bodies on the spring (Hz).
+    /// Natural frequency of the two bodies on the spring, with what else the joint holds (Hz).
     pub hertz: f64,
     /// Damping ratio (1); 1 is critical.
     pub damping_ratio: f64,
@@ -91,29 +91,33 @@ impl Axial {
         }
     }
 
-    /// States the rows along the coordinate `value` with Jacobian `j`.
+    /// States the rows along the coordinate `value` with Jacobian `j`. `rigid` are the rows that hold the other coordinates.
     #[inline(always)]
-    pub fn rows<L: Lanes>(
+    pub fn rows<L: Lanes, const N: usize>(
         form: Form,
-        j: Jacobian<L>,
+        (j, rigid): (Jacobian<L>, [Jacobian<L>; N]),
         value: L,
         mut numbers: &[L],
         mut kept: &mut [L],
         on: &mut impl JointPass<L>,
     ) {
+        if Axial::numbers(form) == 0 {
+            return;
+        }
+        let ease = on.ease(&j, &rigid);
         if form.spring {
             let law = RowLaw::Spring { stiffness: numbers[0], damping: numbers[1], cap: None };
-            on.row(j, value - numbers[2], law, &mut kept[..2]);
+            on.free_row(j, value - numbers[2], law, &mut kept[..2], ease);
             (numbers, kept) = (&numbers[3..], &mut kept[2..]);
         }
         if form.motor {
             let law = RowLaw::Motor { speed: numbers[0], cap: numbers[1] };
-            on.row(j, L::zero(), law, &mut kept[..1]);
+            on.free_row(j, L::zero(), law, &mut kept[..1], ease);
             (numbers, kept) = (&numbers[2..], &mut kept[1..]);
         }
         if form.limits {
-            on.row(j, value - numbers[0], RowLaw::Limit, &mut kept[..1]);
-            on.row(j.reversed(), numbers[1] - value, RowLaw::Limit, &mut kept[1..2]);
+            on.free_row(j, value - numbers[0], RowLaw::Limit, &mut kept[..1], ease);
+            on.free_row(j.reversed(), numbers[1] - value, RowLaw::Limit, &mut kept[1..2], ease);
         }
     }
 

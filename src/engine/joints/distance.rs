@@ -80,7 +80,7 @@ impl JointType for Distance {
         if Axial::kept(form) == 0 {
             on.row(j, error, RowLaw::Rigid, kept);
         } else {
-            Axial::rows(form, j, error, &numbers[FRAME..], kept, on);
+            Axial::rows(form, (j, []), error, &numbers[FRAME..], kept, on);
         }
     }
 }

@@ -73,8 +73,8 @@ impl JointType for MotorJoint {
         let law = |cap: L| RowLaw::Spring { stiffness: numbers[1], damping: numbers[2], cap: Some(cap) };
         let (of_points, of_angle) = kept.split_at_mut(4);
         on.row(Jacobian::angle(), numbers[0] + on.turn(), law(numbers[4]), of_angle);
-        let (arms, offset) = on.anchors();
-        on.block(Jacobian::point(arms), offset, law(numbers[3]), of_points);
+        let (rows, offset) = on.point();
+        on.block(rows, offset, law(numbers[3]), of_points);
     }
 }
 

@@ -3,7 +3,7 @@
 use super::axial::Spring;
 use super::{Definition, Form, JointState, Measured, check_not_negative};
 use crate::bodies::def::finite_pair;
-use crate::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
+use crate::constraints::joints::rows::{JointPass, RowLaw};
 use crate::constraints::joints::{JointSetup, JointType};
 use crate::error::Error;
 use crate::lanes::Lanes;
@@ -60,8 +60,8 @@ impl JointType for Mouse {
     #[inline(always)]
     fn rows<L: Lanes>(_form: Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
         let law = RowLaw::Spring { stiffness: numbers[0], damping: numbers[1], cap: Some(numbers[2]) };
-        let (arms, offset) = on.anchors();
-        on.block(Jacobian::point(arms), offset, law, kept);
+        let (rows, offset) = on.point();
+        on.block(rows, offset, law, kept);
     }
 }
 

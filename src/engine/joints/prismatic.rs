@@ -98,8 +98,9 @@ impl JointType for Prismatic {
     fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
         let ([along, across], [translation, off]) = along_and_across(numbers, on);
         let (rigid, kept) = kept.split_at_mut(2);
-        Axial::rows(form, along, translation, &numbers[FRAME..], kept, on);
-        on.block([across, Jacobian::angle()], [off, numbers[2] + on.turn()], RowLaw::Rigid, rigid);
+        let held = [across, Jacobian::angle()];
+        Axial::rows(form, (along, held), translation, &numbers[FRAME..], kept, on);
+        on.block(held, [off, numbers[2] + on.turn()], RowLaw::Rigid, rigid);
     }
 }
 

@@ -67,11 +67,11 @@ impl JointType for Revolute {
     fn rows<L: Lanes>(form: Form, numbers: &[L], kept: &mut [L], on: &mut impl JointPass<L>) {
         let (point, kept) = kept.split_at_mut(2);
         if Axial::numbers(form) > 0 {
-            let angle = numbers[0] + on.turn();
-            Axial::rows(form, Jacobian::angle(), angle, &numbers[1..], kept, on);
+            let (angle, held) = (numbers[0] + on.turn(), on.point().0);
+            Axial::rows(form, (Jacobian::angle(), held), angle, &numbers[1..], kept, on);
         }
-        let (arms, offset) = on.anchors();
-        on.block(Jacobian::point(arms), offset, RowLaw::Rigid, point);
+        let (rows, offset) = on.point();
+        on.block(rows, offset, RowLaw::Rigid, point);
     }
 }
 

@@ -64,17 +64,21 @@ impl JointType for Weld {
             |at: usize| RowLaw::Spring { stiffness: numbers[at], damping: numbers[at + 1], cap: None };
         let (linear, angular) = (form.spring, form.motor);
         if !linear && !angular {
-            let (arms, offset) = on.anchors();
-            let [x, y] = Jacobian::point(arms);
+            let ([x, y], offset) = on.point();
             let error = [offset[0], offset[1], numbers[0] + on.turn()];
             return on.block([x, y, Jacobian::angle()], error, RowLaw::Rigid, kept);
         }
         let (of_points, of_angle) = kept.split_at_mut(if linear { 4 } else { 2 });
         let law = if angular { spring(if linear { FRAME + 2 } else { FRAME }) } else { RowLaw::Rigid };
-        on.row(Jacobian::angle(), numbers[0] + on.turn(), law, of_angle);
-        let (arms, offset) = on.anchors();
+        let (angle, (rows, offset)) = (numbers[0] + on.turn(), on.point());
+        if linear {
+            on.row(Jacobian::angle(), angle, law, of_angle);
+        } else {
+            let ease = on.ease(&Jacobian::angle(), &rows);
+            on.free_row(Jacobian::angle(), angle, law, of_angle, ease);
+        }
         let law = if linear { spring(FRAME) } else { RowLaw::Rigid };
-        on.block(Jacobian::point(arms), offset, law, of_points);
+        on.block(rows, offset, law, of_points);
     }
 }
 

@@ -90,8 +90,8 @@ impl JointType for Wheel {
         let (rigid, kept) = kept.split_at_mut(1);
         let (of_suspension, of_drive) = kept.split_at_mut(Axial::kept(suspension));
         let (first, second) = numbers[FRAME..].split_at(Axial::numbers(suspension));
-        Axial::rows(suspension, along, translation, first, of_suspension, on);
-        Axial::rows(drive, Jacobian::angle(), L::zero(), second, of_drive, on);
+        Axial::rows(suspension, (along, [across]), translation, first, of_suspension, on);
+        Axial::rows(drive, (Jacobian::angle(), [across]), L::zero(), second, of_drive, on);
         on.row(across, off, RowLaw::Rigid, rigid);
     }
 }

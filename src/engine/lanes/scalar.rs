@@ -77,7 +77,7 @@ impl Lanes for f32 {
 
     #[inline(always)]
     fn select_equal(self, other: Self, yes: Self, no: Self) -> Self {
-        if self == other { yes } else { no }
+        if self.to_bits() == other.to_bits() { yes } else { no }
     }
 
     #[inline(always)]

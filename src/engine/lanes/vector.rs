@@ -123,7 +123,8 @@ pub trait Lanes:
         v: [Self; 4],
     );
 
-    /// `self == other ? yes : no`, as floats: −0 equals 0.
+    /// `self == other ? yes : no`, as the bits of integers. As floats, small integers are subnormal, and threads that
+    /// treat subnormal numbers as zero could not tell them apart.
     fn select_equal(self, other: Self, yes: Self, no: Self) -> Self;
 
     /// `self`, an integer n in [0, 2²³), converted to the bits of the integer n.

@@ -5,10 +5,10 @@ use super::quads::{self, Quad};
 use super::rows::{self, BodyRow};
 use super::vector::{INTEGERS, Lanes, MANTISSA};
 use bytemuck::Zeroable;
-use wide::{f32x4, f32x8, f32x16};
+use wide::{f32x4, f32x8, f32x16, i32x4, i32x8, i32x16};
 
 macro_rules! wide_lanes {
-    ($type:ty, $width:literal, quads: $gather_quads:ident, $scatter:ident, $halves:ident
+    ($type:ty, $width:literal, bits: $bits:ty, quads: $gather_quads:ident, $scatter:ident, $halves:ident
      $(, rows: $gather:ident)? $(, whole: $whole:ident)?) => {
         impl Lanes for $type {
             const WIDTH: usize = $width;
@@ -97,7 +97,8 @@ macro_rules! wide_lanes {
 
             #[inline(always)]
             fn select_equal(self, other: Self, yes: Self, no: Self) -> Self {
-                wide::Select::select(self.simd_eq(other), yes, no)
+                let [bits, other]: [$bits; 2] = [bytemuck::cast(self), bytemuck::cast(other)];
+                wide::Select::select(bytemuck::cast::<$bits, Self>(bits.simd_eq(other)), yes, no)
             }
 
             #[inline(always)]
@@ -108,9 +109,9 @@ macro_rules! wide_lanes {
     };
 }
 
-wide_lanes!(f32x4, 4, quads: gather_4, scatter_4, scatter_halves_4);
-wide_lanes!(f32x8, 8, quads: gather_8, scatter_8, scatter_halves_8, whole: gather_8);
-wide_lanes!(f32x16, 16, quads: gather_16, scatter_16, scatter_halves_16, rows: gather_16);
+wide_lanes!(f32x4, 4, bits: i32x4, quads: gather_4, scatter_4, scatter_halves_4);
+wide_lanes!(f32x8, 8, bits: i32x8, quads: gather_8, scatter_8, scatter_halves_8, whole: gather_8);
+wide_lanes!(f32x16, 16, bits: i32x16, quads: gather_16, scatter_16, scatter_halves_16, rows: gather_16);
 
 #[cfg(test)]
 mod tests {

@@ -14,6 +14,8 @@ use crate::lanes::{
 };
 use crate::shapes::Shape;
 use bytemuck::bytes_of;
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hasher};
 use wide::{f32x4, f32x8};
 
 /// The kernel of a pair of shapes.
@@ -64,28 +66,71 @@ impl PairKind {
 pub struct Shapes {
     rows: Vec<ShapeRow>,
     hulls: Vec<HullRow>,
+    /// How many shapes have each number.
+    uses: Vec<u32>,
+    /// Numbers without a shape.
+    free: Vec<u32>,
+    /// Number of the rows with this hash.
+    known: HashMap<u64, u32>,
 }
 
-/// Number of recent rows among which an equal one is searched.
-const RECENT: usize = 64;
+/// Hash of the bits of the rows of a shape.
+fn hash_of(row: &ShapeRow, hull: &HullRow) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    hasher.write(bytes_of(row));
+    hasher.write(bytes_of(hull));
+    hasher.finish()
+}
 
 impl Shapes {
-    /// Adds a shape; returns its class and its number. Shapes with equal bits share a number if they are
-    /// added soon after each other. Most scenes then have few rows, which stay in the cache, and many batches
-    /// of a single one.
+    /// Adds a shape; returns its class and its number. Shapes with equal bits share a number. Most scenes then have few
+    /// rows, which stay in the cache, and many batches of a single one.
     pub fn push(&mut self, shape: &Shape) -> (Class, u32) {
         let (class, row) = ShapeRow::new(shape);
         let hull = HullRow::new(shape);
-        let is_same = |&i: &usize| {
+        let hash = hash_of(&row, &hull);
+        let is_same = |&number: &u32| {
+            let i = number as usize;
             bytes_of(&self.rows[i]) == bytes_of(&row) && bytes_of(&self.hulls[i]) == bytes_of(&hull)
         };
-        let count = self.rows.len();
-        let number = (count.saturating_sub(RECENT)..count).rev().find(is_same).unwrap_or_else(|| {
-            self.rows.push(row);
-            self.hulls.push(hull);
-            count
+        let number = self.known.get(&hash).copied().filter(is_same).unwrap_or_else(|| {
+            let number = self.free.pop().unwrap_or(self.rows.len() as u32);
+            let i = number as usize;
+            self.rows.resize(self.rows.len().max(i + 1), row);
+            self.hulls.resize(self.hulls.len().max(i + 1), hull);
+            self.uses.resize(self.uses.len().max(i + 1), 0);
+            (self.rows[i], self.hulls[i]) = (row, hull);
+            self.known.insert(hash, number);
+            number
         });
-        (class, number as u32)
+        self.uses[number as usize] += 1;
+        (class, number)
+    }
+
+    /// Removes a shape with this number.
+    ///
+    /// # Panics
+    /// If no shape has it.
+    pub fn remove(&mut self, number: u32) {
+        let i = number as usize;
+        self.uses[i] -= 1;
+        if self.uses[i] == 0 {
+            let hash = hash_of(&self.rows[i], &self.hulls[i]);
+            if self.known.get(&hash) == Some(&number) {
+                self.known.remove(&hash);
+            }
+            self.free.push(number);
+        }
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there are no rows.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
     }
 }
 
@@ -254,7 +299,8 @@ fn run_of<L: Lanes>(kind: PairKind) -> CollideFn {
 fn run<L: Lanes, const KIND: usize>(lists: JobLists, input: Input, room: Room, change: &mut Change) -> usize {
     // Spilled vectors then do not cross cache lines; see `align_frame`.
     align_frame();
-    let Input { poses, displacements, rolling, shapes: Shapes { rows, hulls }, margins, freezing } = input;
+    let Input { poses, displacements, rolling, shapes: Shapes { rows, hulls, .. }, margins, freezing } =
+        input;
     let freezing = freezing.map(|limits| (limits, poses));
     let has_radii = rolling.is_some();
     match const { PairKind::ALL[KIND] } {
@@ -429,8 +475,8 @@ fn run_kernel<L: Lanes>(
 
 /// Writes manifolds into contacts. A point keeps the impulses of the old point with the same feature id.
 ///
-/// Integers are moved and compared as the bits of floats: numbers below 2²³ with equal bits are equal (tiny)
-/// floats. The id of an unused old point is NaN, which equals nothing.
+/// Integers below 2²³ are moved and compared as bits. The id of an unused old point is the bits of NaN, which no
+/// integer below 2²³ has.
 ///
 /// No two lanes may have the same target.
 #[inline(always)]

@@ -24,6 +24,7 @@ pub mod hull_circle;
 pub mod hulls;
 pub mod lanes;
 pub mod rectangles;
+pub mod seams;
 
 use crate::contacts::Manifold;
 use crate::params::{LINEAR_SLOP, SPECULATIVE_DISTANCE};

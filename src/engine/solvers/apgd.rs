@@ -70,6 +70,16 @@ impl Solver for Apgd {
     fn step(&mut self, passes: &mut Passes<'_>) {
         step(passes, &mut self.steepness);
     }
+
+    fn kept(&self) -> Vec<f64> {
+        vec![self.steepness]
+    }
+
+    fn set_kept(&mut self, kept: &[f64]) {
+        if let &[steepness] = kept {
+            self.steepness = steepness.max(0.0);
+        }
+    }
 }
 
 fn step(passes: &mut Passes<'_>, steepness: &mut f64) {

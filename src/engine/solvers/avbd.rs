@@ -145,6 +145,14 @@ impl Solver for Avbd {
             passes.end_substep(substep);
         }
     }
+
+    fn kept(&self) -> Vec<f64> {
+        self.descent.joints.kept()
+    }
+
+    fn set_kept(&mut self, kept: &[f64]) {
+        self.descent.joints.set_kept(kept);
+    }
 }
 
 impl Avbd {

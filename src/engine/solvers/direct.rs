@@ -172,7 +172,7 @@ impl Newton {
         let islands = parts(system.rows(), points, &joints).into_iter().map(|(points, blocks)| {
             let mut law = IslandLaw::new(points, system.rows(), &written, &velocities, &surfaces);
             for &block in &blocks {
-                law.join(system.rows(), &joints.blocks[block], rule.of_errors().bias_rate, h);
+                law.join(system.rows(), &joints.blocks[block], rule.of_errors(), h);
             }
             (Island::new(law), blocks)
         });

@@ -166,7 +166,7 @@ pub enum Guarantee {
 ///
 /// let mut world = World::new(Settings::new(&MINE));
 /// world.step()?;
-/// # Ok::<(), simpulse_engine::world::Divergence>(())
+/// # Ok::<(), simpulse_engine::world::StepError>(())
 /// ```
 #[derive(Debug)]
 pub struct Variant {
@@ -204,6 +204,16 @@ pub struct Variant {
     pub exceptions: &'static [(Guarantee, &'static str)],
     /// Creates the solver of a world: its schedule and its state.
     pub make: fn() -> Box<dyn Solver>,
+}
+
+/// Errors: a value out of the parameter's range.
+fn in_range(parameter: &Parameter, value: f32) -> Result<(), Error> {
+    let Parameter { name, unit, range: [least, greatest], .. } = *parameter;
+    if (least..=greatest).contains(&value) {
+        return Ok(());
+    }
+    let message = format!("{value} is not within {least} to {greatest} {unit}");
+    Err(Error::invalid(name, message.trim_end()))
 }
 
 /// The variant called `name`.
@@ -267,13 +277,14 @@ impl Variant {
     /// Sets the parameter called `name`. Errors: no such parameter, or a value out of its range.
     pub fn set(&self, values: &mut Parameters, name: &str, value: f32) -> Result<(), Error> {
         let place = self.parameter(name)?;
-        let Parameter { name, unit, range: [least, greatest], .. } = self.parameters[place];
-        if !(value >= least && value <= greatest) {
-            let message = format!("{value} is not within {least} to {greatest} {unit}");
-            return Err(Error::invalid(name, message.trim_end()));
-        }
+        in_range(&self.parameters[place], value)?;
         values[place] = value;
         Ok(())
+    }
+
+    /// Checks values of its parameters. Errors: one out of its range.
+    pub fn check(&self, values: &Parameters) -> Result<(), Error> {
+        self.parameters.iter().zip(values).try_for_each(|(parameter, &value)| in_range(parameter, value))
     }
 
     /// Index of the mechanism called `name`, for [`crate::params::Without`]; hyphens count as

@@ -1,6 +1,7 @@
 //! Updates contacts from candidates and carries their impulses from step to step.
 
 use super::World;
+use crate::bodies::BodyKind;
 use crate::constraints::Solver;
 use crate::constraints::step::{Collision, CollisionScene};
 use crate::contacts::Contact;
@@ -95,6 +96,17 @@ impl World {
         self.with_scene(|solver, scene| solver.before_collision(scene, &mut asked));
         let narrow = &mut self.narrow;
         narrow.list_jobs(self.contacts.len());
+
+        let margins = Margins::of(self.settings.length_unit);
+        if std::mem::take(&mut self.seams_are_stale) {
+            let is_ground = |shape: usize| {
+                let body = self.shape_body[shape] as usize;
+                self.bodies.kind[body] == BodyKind::Static && self.slots.lives[body]
+            };
+            self.seams.build(&self.bodies, &self.shapes, &self.shape_body, is_ground, margins);
+        }
+        let is_ghost = |contact: &Contact| self.seams.is_ghost(contact, &self.bodies, &self.shapes, margins);
+        let mut ghost_points = 0;
         let Narrow { candidates, jobs, fresh, is_changed, poses, displacements, shapes, found, .. } = narrow;
         fresh.clear();
         let mut change = |name: u32, contact: &Contact, found: Option<Found>| {
@@ -103,25 +115,35 @@ impl World {
                 NO_CONTACT
             } else {
                 let Contact { manifold, radii, .. } = *contact;
-                fresh.push((Contact { manifold, radii, ..candidate.without_manifold() }, found));
+                let contact = Contact { manifold, radii, ..candidate.without_manifold() };
+                if !self.seams.is_empty() && is_ghost(&contact) {
+                    ghost_points += manifold.count as usize;
+                    return;
+                }
+                fresh.push((contact, found));
                 FRESH | (fresh.len() - 1) as u32
             };
             *is_changed = true;
         };
         // `displacements` covers more than a step.
         let rolling = asked.rolling.map(|Rolling { limit }| Rolling { limit: AHEAD * limit });
-        let input = Input {
-            poses,
-            displacements,
-            rolling,
-            shapes,
-            margins: Margins::of(self.settings.length_unit),
-            freezing,
-        };
+        let input = Input { poses, displacements, rolling, shapes, margins, freezing };
         let (mut points, width, contacts) = (0, self.settings.widths()[1], &mut self.contacts);
         for (kind, jobs) in PairKind::ALL.into_iter().zip(jobs) {
             points += batch::update(kind, width, jobs, input, contacts, found, &mut change);
         }
+        if !self.seams.is_empty() {
+            let touching = candidates.iter_mut().filter(|c| c.contact & FRESH == 0);
+            for candidate in touching {
+                let contact = &self.contacts[candidate.contact as usize];
+                if is_ghost(contact) {
+                    ghost_points += contact.manifold.count as usize;
+                    candidate.contact = NO_CONTACT;
+                    *is_changed = true;
+                }
+            }
+        }
+        points -= ghost_points;
         if narrow.is_changed {
             narrow.sort_contacts(&mut self.contacts);
         }

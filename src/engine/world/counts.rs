@@ -1,5 +1,6 @@
 //! Counts of a step, and divergence.
 
+use crate::error::Error;
 use crate::params::DIVERGED_SPEED;
 
 /// Counts of the last step.
@@ -70,8 +71,8 @@ pub enum Criterion {
 /// let mut world = World::new(Settings::new(solvers::find("pgs")?));
 /// let fast = BodyDef::dynamic([0.0, 0.0]).with_velocity([2e5, 0.0]);
 /// world.add_body(&fast.with(ShapeDef::circle(0.5)?))?;
-/// let divergence = world.step().unwrap_err();
-/// assert!(divergence.to_string().starts_with("diverged at step 1: body 0 moves at 2.000e5 m/s"));
+/// let error = world.step().unwrap_err();
+/// assert!(error.to_string().starts_with("diverged at step 1: body 0 moves at 2.000e5 m/s"));
 /// # Ok::<(), simpulse_engine::error::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,6 +90,43 @@ pub struct Divergence {
 }
 
 impl std::error::Error for Divergence {}
+
+/// Why a step failed.
+///
+/// ```
+/// # use simpulse_engine::{solvers, world::{Settings, World}};
+/// let mut world = World::new(Settings { dt: 0.0, ..Settings::new(solvers::find("shim")?) });
+/// assert_eq!(world.step().unwrap_err().to_string(), "dt: must be positive and finite, is 0.0");
+/// # Ok::<(), simpulse_engine::error::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub enum StepError {
+    /// A setting out of its range; the world is unchanged.
+    Settings(Error),
+    /// A body diverged.
+    Diverged(Divergence),
+}
+
+impl StepError {
+    /// The divergence; `None` for a setting out of its range.
+    pub fn divergence(self) -> Option<Divergence> {
+        match self {
+            StepError::Settings(_) => None,
+            StepError::Diverged(divergence) => Some(divergence),
+        }
+    }
+}
+
+impl std::error::Error for StepError {}
+
+impl std::fmt::Display for StepError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            StepError::Settings(error) => error.fmt(f),
+            StepError::Diverged(divergence) => divergence.fmt(f),
+        }
+    }
+}
 
 impl std::fmt::Display for Divergence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

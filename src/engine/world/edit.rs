@@ -8,6 +8,7 @@ use crate::constraints::kernels::types::ConstraintType;
 use crate::error::Error;
 use crate::shapes::{Aabb, MassProperties, Shape};
 use glam::Vec2;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Body slots: which indices are in use.
 #[derive(Clone, Debug, Default)]
@@ -23,8 +24,22 @@ pub(super) struct Slots {
     pub shapes: Vec<u32>,
     /// Indices that may be reused.
     pub free: Vec<u32>,
+    /// Generation of the first body at each index. Every new world has another one, so it does not accept the handles of
+    /// others. Clones and saved copies keep it.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub first_generation: u32,
     /// Bodies removed since the last step; their indices may be reused after the next.
     pub removed: Vec<u32>,
+}
+
+impl Slots {
+    /// Slots of a new world.
+    pub fn new() -> Self {
+        /// Far from those of other worlds, however often indices are reused.
+        const APART: u32 = 0x9E37_79B9;
+        static NEXT: AtomicU32 = AtomicU32::new(0);
+        Slots { first_generation: NEXT.fetch_add(APART, Ordering::Relaxed), ..Slots::default() }
+    }
 }
 
 /// Persistent force and torque of a body, saved before those for one step are added.
@@ -81,6 +96,7 @@ impl World {
         }
         self.fat_boxes.set(index, first, &self.shapes[first..first + count as usize]);
         self.traits.add(body, self.bodies.round[index]);
+        self.seams_are_stale |= body.kind == BodyKind::Static;
         self.features = self.traits.features();
         (self.pairs_are_stale, self.continuous_is_stale, self.lanes_are_for) = (true, true, None);
         Ok(BodyHandle { index: index as u32, generation: self.slots.generation[index] })
@@ -90,7 +106,7 @@ impl World {
     pub(super) fn push_body(&mut self, body: &BodyDef, mass: &MassProperties, shapes: usize) -> usize {
         let index = self.bodies.push(body, mass);
         let slots = &mut self.slots;
-        slots.generation.push(0);
+        slots.generation.push(slots.first_generation);
         slots.lives.push(false);
         slots.first_shape.push(self.shapes.len() as u32);
         slots.shapes.push(shapes as u32);
@@ -145,7 +161,6 @@ impl World {
     /// ```
     pub fn remove_body(&mut self, body: BodyHandle) -> Result<(), Error> {
         let i = self.index_of(body)?;
-        self.group_joints();
         if self
             .own_types()
             .iter()
@@ -154,6 +169,7 @@ impl World {
             return Err(Error::invalid(format!("body {i}"), "has constraints of another type than contacts"));
         }
         self.remove_joints_of(body);
+        self.seams_are_stale |= self.bodies.kind[i] == BodyKind::Static;
         let nothing = BodyDef::fixed([0.0; 2]);
         self.bodies.set(i, &nothing, &MassProperties::ZERO);
         let slots = &mut self.slots;
@@ -169,8 +185,9 @@ impl World {
 
     /// Removes a body's shapes, `count` of them starting at `first`, from the broad phase.
     pub(super) fn leave_world(&mut self, body: usize, first: usize, count: usize) {
-        for proxy in &mut self.proxies[first..first + count] {
+        for (proxy, surface) in self.proxies[first..].iter_mut().zip(&self.surfaces[first..]).take(count) {
             (proxy.aabb, proxy.dynamic) = (NOWHERE, false);
+            self.narrow.shapes.remove(surface.number);
         }
         self.fat_boxes.remove(body);
     }
@@ -180,7 +197,7 @@ impl World {
         self.index_of(body).is_ok()
     }
 
-    /// The index of a body. Errors: the body was removed.
+    /// The index of a body. Errors: the body was removed, or is of another world.
     pub fn index_of(&self, body: BodyHandle) -> Result<usize, Error> {
         let (i, slots) = (body.index(), &self.slots);
         let is_same = slots.generation.get(i) == Some(&body.generation) && slots.lives[i];
@@ -220,6 +237,17 @@ impl World {
         let center = self.bodies.local_center[i].as_dvec2().to_array();
         self.bodies.place(i, position, angle, center);
         self.fat_boxes.forget(i);
+        self.seams_are_stale |= self.bodies.kind[i] == BodyKind::Static;
+        Ok(())
+    }
+
+    /// Sets the collision group of a body; bodies of the same non-zero group do not collide. Errors: the body was removed.
+    pub fn set_group(&mut self, body: BodyHandle, group: i32) -> Result<(), Error> {
+        let i = self.index_of(body)?;
+        self.bodies.group[i] = group;
+        let [first, count] = [self.slots.first_shape[i], self.slots.shapes[i]].map(|k| k as usize);
+        self.proxies[first..first + count].iter_mut().for_each(|proxy| proxy.group = group);
+        self.pairs_are_stale = true;
         Ok(())
     }
 
@@ -235,7 +263,6 @@ impl World {
         }
         [self.bodies.velocity_x[i], self.bodies.velocity_y[i]] = velocity;
         self.bodies.angular_velocity[i] = spin;
-        self.may_spin(spin);
         Ok(())
     }
 
@@ -294,9 +321,7 @@ impl World {
         let b = &mut self.bodies;
         b.velocity_x[i] += b.inv_mass[i] * impulse.x;
         b.velocity_y[i] += b.inv_mass[i] * impulse.y;
-        let spin = b.inv_inertia[i] * arm.perp_dot(impulse);
-        b.angular_velocity[i] += spin;
-        self.may_spin(spin);
+        b.angular_velocity[i] += b.inv_inertia[i] * arm.perp_dot(impulse);
         Ok(())
     }
 
@@ -314,16 +339,7 @@ impl World {
         b.force_x[i] += force.x;
         b.force_y[i] += force.y;
         b.torque[i] += torque;
-        self.may_spin(torque);
         Ok(())
-    }
-
-    /// Enables rotation if `spin` is not 0. Kernels of scenes without rotation omit it.
-    fn may_spin(&mut self, spin: f32) {
-        if spin != 0.0 {
-            self.traits.spins();
-            self.features = self.traits.features();
-        }
     }
 
     /// After a step: restores persistent forces and frees the indices of removed bodies.

@@ -37,6 +37,8 @@ pub(super) struct JointSlots {
     groups: usize,
     /// Whether joints were added, changed or removed since they were grouped.
     stale: bool,
+    /// `[body, joint]`: the joints of each body.
+    of_body: BTreeSet<[u32; 2]>,
     /// Kept numbers and angles of a deserialized world; `[joints]`, or empty.
     read: Vec<(Vec<f32>, f32)>,
     /// Pairs of bodies that do not collide with each other, smaller index first.
@@ -50,21 +52,31 @@ impl JointSlots {
     }
 
     fn remove(&mut self, index: usize) {
-        self.joints[index] = None;
+        self.set(index, None);
         self.generation[index] = self.generation[index].wrapping_add(1);
         self.places[index] = None;
         self.free.push(index as u32);
     }
 
-    fn add(&mut self, joint: Joint) -> JointHandle {
+    /// Replaces the joint at an index.
+    fn set(&mut self, index: usize, joint: Option<Joint>) {
+        let ends = |joint: &Joint| [joint.a, joint.b].map(|body| [body.index() as u32, index as u32]);
+        for end in self.joints[index].iter().flat_map(ends) {
+            self.of_body.remove(&end);
+        }
+        self.of_body.extend(joint.iter().flat_map(ends));
+        self.joints[index] = joint;
+    }
+
+    fn add(&mut self, joint: Joint, first_generation: u32) -> JointHandle {
         let index = self.free.pop().map_or(self.joints.len(), |index| index as usize);
         if index == self.joints.len() {
             self.joints.push(None);
-            self.generation.push(0);
+            self.generation.push(first_generation);
             self.places.push(None);
         }
         keep_apart(&mut self.apart, &joint);
-        self.joints[index] = Some(joint);
+        self.set(index, Some(joint));
         JointHandle { index: index as u32, generation: self.generation[index] }
     }
 }
@@ -85,7 +97,7 @@ impl World {
     /// filters.
     pub fn add_joint(&mut self, joint: &Joint) -> Result<JointHandle, Error> {
         let joint = self.admit(joint)?;
-        Ok(self.joints.add(joint))
+        Ok(self.joints.add(joint, self.slots.first_generation))
     }
 
     /// Checks a joint and prepares its bodies; returns the joint with its frames.
@@ -110,7 +122,7 @@ impl World {
         self.joint(handle)?;
         let joint = self.admit(joint)?;
         keep_apart(&mut self.joints.apart, &joint);
-        self.joints.joints[handle.index()] = Some(joint);
+        self.joints.set(handle.index(), Some(joint));
         Ok(())
     }
 
@@ -275,13 +287,12 @@ impl World {
 
     /// Removes all joints of a body.
     pub(super) fn remove_joints_of(&mut self, body: BodyHandle) {
-        for index in 0..self.joints.joints.len() {
-            if self.joints.joints[index].as_ref().is_some_and(|joint| joint.a == body || joint.b == body) {
-                self.joints.remove(index);
-                self.joints_changed();
-            }
+        while let Some(&[_, joint]) =
+            self.joints.of_body.range([body.index, 0]..=[body.index, u32::MAX]).next()
+        {
+            self.joints.remove(joint as usize);
+            self.joints_changed();
         }
-        self.group_joints();
     }
 
     fn joints_changed(&mut self) {
@@ -399,12 +410,15 @@ impl SavedJoints {
         let free = self.joints.iter().enumerate().filter(|(_, joint)| joint.is_none()).map(|(i, _)| i as u32);
         world.joints = JointSlots {
             free: free.collect(),
-            joints: self.joints,
+            joints: vec![None; self.joints.len()],
             generation: self.generation,
             places,
             read: self.kept,
             ..JointSlots::default()
         };
+        for (index, joint) in self.joints.into_iter().enumerate() {
+            world.joints.set(index, joint);
+        }
         world.joints_changed();
         world.group_joints();
     }

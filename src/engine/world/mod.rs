@@ -16,6 +16,7 @@ use crate::continuous::{Continuous, Moving};
 use crate::lanes::LaneWidth;
 use crate::narrowphase::Margins;
 use crate::narrowphase::lanes::{Class, PoseRow};
+use crate::narrowphase::seams::Seams;
 use crate::params::DIVERGED_SPEED;
 use crate::shapes::Shape;
 use crate::solvers::{self, Variant};
@@ -40,7 +41,7 @@ mod saved;
 mod settings;
 mod traits;
 
-pub use counts::{Criterion, Divergence, Quantity, StepCounts};
+pub use counts::{Criterion, Divergence, Quantity, StepCounts, StepError};
 pub use events::{ContactEvent, ContactPoint};
 pub use joints::SolvedBlock;
 pub use queries::{Queries, RayHit};
@@ -94,10 +95,8 @@ struct Surface {
 pub struct World {
     /// Body state.
     pub bodies: Bodies,
-    /// Shapes, in the frame of their body's center of mass.
-    pub shapes: Vec<Shape>,
-    /// Body of each shape.
-    pub shape_body: Vec<u32>,
+    shapes: Vec<Shape>,
+    shape_body: Vec<u32>,
     /// Contacts of the last step with at least one point, sorted by shape pair.
     pub contacts: Vec<Contact>,
     /// Settings of the run.
@@ -117,6 +116,9 @@ pub struct World {
     pairs: Vec<[u32; 2]>,
     pairs_are_stale: bool,
     narrow: Narrow,
+    seams: Seams,
+    /// Whether static bodies came, went or were moved since `seams` were found.
+    seams_are_stale: bool,
     assignment: Assignment,
     continuous: Continuous,
     /// Whether bodies were added or removed since `continuous` was built.
@@ -168,6 +170,8 @@ impl World {
             pairs: Vec::new(),
             pairs_are_stale: true,
             narrow: Narrow::default(),
+            seams: Seams::default(),
+            seams_are_stale: true,
             assignment: Assignment::default(),
             continuous: Continuous::default(),
             continuous_is_stale: true,
@@ -176,7 +180,7 @@ impl World {
             solver: (settings.solver.make)(),
             solver_is: settings.solver,
             work: Workspace::default(),
-            slots: Slots::default(),
+            slots: Slots::new(),
             applied: Vec::new(),
             events: Events::default(),
             joints: JointSlots::default(),
@@ -184,13 +188,24 @@ impl World {
         }
     }
 
+    /// Shapes, in the frame of their body's center of mass.
+    pub fn shapes(&self) -> &[Shape] {
+        &self.shapes
+    }
+
+    /// Body of each shape.
+    pub fn shape_body(&self) -> &[u32] {
+        &self.shape_body
+    }
+
     /// Kernel features that the scene's constraints need.
     pub fn features(&self) -> Features {
         self.features
     }
 
-    /// Advances the world by `settings.dt`. Errors: a body diverged.
-    pub fn step(&mut self) -> Result<(), Divergence> {
+    /// Advances the world by `settings.dt`. Errors: as [`Settings::check`]; a body diverged.
+    pub fn step(&mut self) -> Result<(), StepError> {
+        self.settings.check().map_err(StepError::Settings)?;
         let mut clock = Clock::start(self.settings.timed);
         self.solve(&mut clock);
         self.store();
@@ -201,7 +216,7 @@ impl World {
         if self.settings.contact_events {
             self.find_events();
         }
-        self.check()
+        self.check().map_err(StepError::Diverged)
     }
 
     /// Writes velocities and displacements of the rows back to the bodies.
@@ -260,8 +275,11 @@ impl World {
     }
 
     /// Finds the contacts of the next step, with their warm-start impulses, without solving. The next step
-    /// then finds the same contacts.
+    /// then finds the same contacts. Nothing happens if a setting is out of its range.
     pub fn find_contacts(&mut self) {
+        if self.settings.check().is_err() {
+            return;
+        }
         self.group_joints();
         self.update_pairs();
         self.update_contacts();
@@ -282,6 +300,8 @@ impl World {
 
     /// Runs a step up to the new velocities and displacements in the rows.
     fn solve(&mut self, clock: &mut Clock) {
+        self.traits.read(&self.bodies);
+        self.features = self.traits.features();
         self.group_joints();
         self.update_pairs();
         clock.lap(Phase::Pairs);

@@ -85,7 +85,7 @@ impl Queries<'_> {
     }
 
     /// The first shape within `reach` (m) along a ray, among bodies that pass `filter`. Errors: as
-    /// [`Self::ray_cast`].
+    /// [`Self::ray_cast`]; a reach that is negative or NaN.
     pub fn ray_cast_where(
         &self,
         from: [f64; 2],
@@ -95,6 +95,9 @@ impl Queries<'_> {
     ) -> Result<Option<RayHit>, Error> {
         finite_pair("from", from)?;
         finite_pair("direction", direction)?;
+        if reach.is_nan() || reach < 0.0 {
+            return Err(Error::invalid("reach", format!("must not be negative, is {reach:?}")));
+        }
         let (origin, along) = (DVec2::from(from), DVec2::from(direction).normalize_or_zero());
         if along == DVec2::ZERO {
             return Err(Error::invalid("direction", "must not be zero"));

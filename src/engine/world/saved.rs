@@ -1,8 +1,7 @@
 //! Serialization of a world: the state at the start of a step, without values that the step recomputes.
 //!
-//! Not saved: constraints of the caller's own types (a world with any is an error), and state that a solver
-//! keeps in its own fields instead of per contact and body. Solvers without such fields continue
-//! bit-identically.
+//! Not saved: constraints of the caller's own types (a world with any is an error), and the piles and jams of `shim` and
+//! `soft_block`. All other solvers continue bit-identically.
 
 use super::edit::{Slots, StandingForces};
 use super::events::Events;
@@ -63,6 +62,9 @@ struct SavedWorld {
     contacts: Vec<Contact>,
     impulses_of: Option<f32>,
     kept: SolverState,
+    /// [`Solver::kept`](crate::constraints::Solver::kept)
+    #[serde(default)]
+    of_solver: Vec<f64>,
     #[serde(default)]
     found: Vec<Found>,
     applied: Vec<StandingForces>,
@@ -90,6 +92,7 @@ impl Serialize for World {
             impulses_of: self.impulses_of,
             kept: self.work.kept.clone(),
             found: self.narrow.found.clone(),
+            of_solver: self.solver.kept(),
             applied: self.applied.clone(),
             events: self.events.clone(),
             traits: self.traits,
@@ -110,6 +113,7 @@ impl<'de> Deserialize<'de> for World {
 impl SavedWorld {
     /// Whether all arrays have matching lengths and all indices are valid.
     fn check(&mut self) -> Result<(), String> {
+        self.settings.check().map_err(|e| e.within("settings").to_string())?;
         let (n, shapes) = (self.bodies.len(), self.shapes.len());
         let floats = self.bodies.arrays_mut().map(|array| array.len());
         let (b, s) = (&self.bodies, &self.slots);
@@ -189,6 +193,7 @@ impl SavedWorld {
         if self.kept.size() == world.solver_is.kept {
             world.work.kept = self.kept;
         }
+        world.solver.set_kept(&self.of_solver);
         self.joints.restore(&mut world);
         world.update_pairs();
         world.contacts = self.contacts;

@@ -1,8 +1,10 @@
 //! Settings of a world.
 
+use crate::bodies::def::{finite_pair, not_negative};
 use crate::broadphase::BroadPhaseKind;
 use crate::constraints::kernels::motion::{Integrator, RotationUpdate};
 use crate::constraints::{Features, ImpactLaw, Impacts};
+use crate::error::Error;
 use crate::lanes::{LaneWidth, native_width};
 use crate::narrowphase::frozen::{FreezeLimits, Freezing};
 use crate::params::{Budget, Parameters, Without};
@@ -144,6 +146,31 @@ impl Settings {
             continuous: solver.continuous,
             extra_features: Features::NONE,
         }
+    }
+
+    /// Checks the values; each step does so first.
+    ///
+    /// Errors, with field and value: a `dt` or `length_unit` that is not positive and finite; no substeps, or so many that
+    /// the reciprocal of [`Self::h`] is not finite; a gravity that is not finite; a limit of `frozen` that is negative or not
+    /// finite; a parameter out of its range.
+    pub fn check(&self) -> Result<(), Error> {
+        let positive = |place: &str, value: f32| {
+            let message = || Error::invalid(place, format!("must be positive and finite, is {value:?}"));
+            if value > 0.0 && value.is_finite() { Ok(()) } else { Err(message()) }
+        };
+        positive("dt", self.dt)?;
+        positive("length_unit", self.length_unit)?;
+        finite_pair("gravity", self.gravity.map(f64::from))?;
+        let substeps = self.budget.substeps;
+        if substeps == 0 || !self.h().recip().is_finite() {
+            let message = format!("must be at least 1 and leave a substep of dt, is {substeps}");
+            return Err(Error::invalid("budget.substeps", message));
+        }
+        if let Freezing::Within(FreezeLimits { distance, turn, .. }) = self.frozen {
+            not_negative("frozen.distance", distance.into())?;
+            not_negative("frozen.turn", turn.into())?;
+        }
+        self.solver.check(&self.parameters).map_err(|e| e.within("parameters"))
     }
 
     /// The narrowest and the widest lanes, limited to those of this build.

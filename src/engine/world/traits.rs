@@ -1,7 +1,8 @@
 //! Features of a world's bodies, collected as they are added.
 
-use crate::bodies::{BodyDef, BodyKind};
+use crate::bodies::{Bodies, BodyDef, BodyKind};
 use crate::constraints::Features;
+use crate::lanes::LaneVec;
 use crate::shapes::Shape;
 
 /// Number of bodies that have a property, and whether one of them is dynamic.
@@ -47,6 +48,13 @@ impl Traits {
         self.has_other_than_discs |= dynamic && !round;
         self.bounces |= any(|s| s.restitution as f32 > 0.0);
         self.damped |= body.linear_damping as f32 > 0.0 || body.angular_damping as f32 > 0.0;
+    }
+
+    /// Records damping, spins and torques that were written to the arrays since bodies were added.
+    pub fn read(&mut self, bodies: &Bodies) {
+        let any = |array: &LaneVec| array.iter().fold(false, |any, &x| any | (x != 0.0));
+        self.damped = self.damped || any(&bodies.linear_damping) || any(&bodies.angular_damping);
+        self.spins = self.spins || any(&bodies.angular_velocity) || any(&bodies.torque);
     }
 
     /// Records that some body may rotate.

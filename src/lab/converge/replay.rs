@@ -14,6 +14,7 @@ use crate::engine::constraints::kernels::motion::{Integrator, MotionInput, Rotat
 use crate::engine::constraints::kernels::observe::ObservedRule;
 use crate::engine::constraints::kernels::velocity::rules::Softness;
 use crate::engine::constraints::records::kept::{SolverState, StateSize};
+use crate::engine::constraints::records::rows::{Jacobian, ROWS};
 use crate::engine::constraints::step::assign::{Assignment, Sides};
 use crate::engine::constraints::{ImpactLaw, PartnerKind, Solver, StepInput, WorkCount, Workspace};
 use crate::engine::contacts::Contact;
@@ -24,7 +25,7 @@ use crate::engine::solvers::{self, Variant};
 use crate::lab::error::Error;
 use crate::lab::reference::rows::OwnRow;
 use crate::lab::reference::{
-    BlockLaw, ContactProblem, DPair, ProblemBlock, ProblemContact, ProblemJoint, ProblemRow, Velocity,
+    BlockLaw, ContactProblem, DPair, ProblemBlock, ProblemContact, ProblemJoint, Velocity,
 };
 use rand::{SeedableRng, seq::SliceRandom};
 use std::fmt;
@@ -347,22 +348,28 @@ impl<'a> Replay<'a> {
     /// The law of the last sweep for the rows of a block: λ ← (1 − γ_i) λ − K⁻¹ γ_m (β C + J v) leaves
     /// impulses unchanged if J v + β C + (γ_i/γ_m) K λ = 0. An open limit may close.
     fn own_rows(&self, rule: &ObservedRule, joint: &ProblemJoint, block: &ProblemBlock) -> Vec<OwnRow> {
-        let Softness { bias_rate, mass_scale, impulse_scale } = rule.joints;
+        let Softness { bias_rate, mass_scale, impulse_scale, .. } = rule.joints;
         let delta = |body: Option<u32>| body.map_or([0.0; 4], |b| rule.deltas[b as usize].map(f64::from));
         let (a, b) = (delta(joint.body_a), delta(joint.body_b));
-        let own = |row: &ProblemRow| {
+        let none = Jacobian { axis: [0.0; 2], arms: [0.0; 2] };
+        let (mut jacobians, mut errors) = ([none; ROWS], [0.0; ROWS]);
+        for ((row, jacobian), error) in block.rows.iter().zip(&mut jacobians).zip(&mut errors) {
             let along = row.axis[0] * (b[0] - a[0]) + row.axis[1] * (b[1] - a[1]);
-            let error = row.error + along + row.arm_b * b[2] - row.arm_a * a[2];
-            match block.law {
-                BlockLaw::Motor { .. } | BlockLaw::Spring { .. } => OwnRow::default(),
-                BlockLaw::Limit if error > 0.0 => OwnRow { bias: error / self.problem.h, compliance: 0.0 },
-                _ => OwnRow {
-                    bias: f64::from(bias_rate) * error,
-                    compliance: f64::from(impulse_scale) / f64::from(mass_scale),
-                },
+            *error = (row.error + along + row.arm_b * b[2] - row.arm_a * a[2]) as f32;
+            jacobian.axis = row.axis.map(|x| x as f32);
+        }
+        let pushed = rule.joints.pushed(&jacobians, errors);
+        let own = |(&error, pushed): (&f32, f32)| match block.law {
+            BlockLaw::Motor { .. } | BlockLaw::Spring { .. } => OwnRow::default(),
+            BlockLaw::Limit if error > 0.0 => {
+                OwnRow { bias: f64::from(error) / self.problem.h, compliance: 0.0 }
             }
+            _ => OwnRow {
+                bias: f64::from(bias_rate * pushed),
+                compliance: f64::from(impulse_scale) / f64::from(mass_scale),
+            },
         };
-        block.rows.iter().map(own).collect()
+        errors.iter().zip(pushed).take(block.rows.len()).map(own).collect()
     }
 
     /// Assigns a lane to every contact, as a world's step does.

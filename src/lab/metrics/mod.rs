@@ -136,9 +136,9 @@ impl Observation {
             world.joints().filter_map(|(joint, _)| world.joint_state(joint).ok()).map(|s| s.gap).sum(),
         );
         let dynamic = world
-            .shapes
+            .shapes()
             .iter()
-            .zip(&world.shape_body)
+            .zip(world.shape_body())
             .filter(|&(_, &body)| world.bodies.is_dynamic(body as usize))
             .map(|(shape, _)| shape.min_half_extent() as f64);
         Observation {

@@ -38,19 +38,19 @@ impl Overlaps {
             let position = (DVec2::from(bodies.center(i)) - origin).as_vec2();
             let pose = Pose { position, rotation: Vec2::new(bodies.rotation_cos[i], bodies.rotation_sin[i]) };
             let aabb = shape.aabb(&pose).grown(near);
-            Proxy { aabb, body, group: bodies.group[i], dynamic: bodies.is_dynamic(i) }
+            Proxy { aabb, body, group: bodies.group(i), dynamic: bodies.is_dynamic(i) }
         };
         self.proxies.clear();
-        self.proxies.extend(world.shapes.iter().zip(&world.shape_body).map(proxy));
+        self.proxies.extend(world.shapes().iter().zip(world.shape_body()).map(proxy));
         self.broadphase.pairs(&self.proxies, &mut self.pairs);
         for &[i, j] in &self.pairs {
             let [a, b] = if self.proxies[j as usize].dynamic { [i, j] } else { [j, i] };
-            let [body_a, body_b] = [a, b].map(|s| world.shape_body[s as usize] as usize);
+            let [body_a, body_b] = [a, b].map(|s| world.shape_body()[s as usize] as usize);
             if world.keeps_apart(body_a, body_b) {
                 continue;
             }
             let [pose_a, pose_b] = bodies.relative_poses(body_a, body_b);
-            let [shape_a, shape_b] = [a, b].map(|s| &world.shapes[s as usize]);
+            let [shape_a, shape_b] = [a, b].map(|s| &world.shapes()[s as usize]);
             let manifold = collide(shape_a, &pose_a, shape_b, &pose_b, near);
             if manifold.count > 0 {
                 each([a, b], &manifold);

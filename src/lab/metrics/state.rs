@@ -78,7 +78,7 @@ impl BodyState {
 /// Distance of each body's farthest point from its center of mass (m).
 pub fn reaches(world: &World) -> Vec<f64> {
     let mut reaches = vec![0.0_f64; world.bodies.len()];
-    for (shape, &body) in world.shapes.iter().zip(&world.shape_body) {
+    for (shape, &body) in world.shapes().iter().zip(world.shape_body()) {
         let (reach, radius) = (&mut reaches[body as usize], f64::from(shape.radius()));
         shape.for_each_vertex(|v| *reach = reach.max(f64::from(v.length()) + radius));
     }

@@ -30,7 +30,7 @@ impl Stage {
     pub fn of(world: &World) -> Self {
         let bodies = &world.bodies;
         let origin = if bodies.is_empty() { [0.0; 2] } else { bodies.center(0) };
-        let shapes = world.shape_body.iter().copied().zip(world.shapes.iter().copied()).collect();
+        let shapes = world.shape_body().iter().copied().zip(world.shapes().iter().copied()).collect();
         let joints = super::joints::records(world);
         Stage { origin, kinds: bodies.kind.clone(), shapes, joints, dt: f64::from(world.settings.dt) }
     }
@@ -110,7 +110,7 @@ fn touch_points(world: &World, poses: &[[f64; 3]], overlaps: &mut Overlaps) -> V
     }
     let mut points = Vec::new();
     overlaps.find(world, |[a, b], manifold| {
-        let bodies = [a, b].map(|shape| world.shape_body[shape as usize]);
+        let bodies = [a, b].map(|shape| world.shape_body()[shape as usize]);
         for p in manifold.points() {
             let known = solved.remove(&(pair_key(a, b), p.feature_id));
             let impulse = known.map_or([0.0; 2], |known| known.impulse);

@@ -46,7 +46,7 @@ pub fn records(world: &World) -> Vec<JointRecord> {
         let bodies = [joint.a.index(), joint.b.index()];
         let [a, b] = joint.kind.anchors();
         let from_center = |anchor: [f64; 2], i: usize| {
-            let center = world.bodies.local_center[i];
+            let center = world.bodies.local_center(i);
             [anchor[0] - f64::from(center.x), anchor[1] - f64::from(center.y)]
         };
         let length = axis[0].hypot(axis[1]);

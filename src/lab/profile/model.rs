@@ -107,7 +107,7 @@ pub fn of(world: &mut World, phase: Phase) -> Option<PassWork> {
     let bodies = world.bodies.len() as f64;
     let moving = world.bodies.kind.iter().filter(|&&kind| kind != BodyKind::Static).count() as f64;
     let (contacts, counts) = (world.contacts.len() as f64, world.counts);
-    let proxies = (size_of::<Proxy>() * world.shapes.len()) as f64;
+    let proxies = (size_of::<Proxy>() * world.shapes().len()) as f64;
     let work = world.workspace();
     let (rows, sets) = (work.rows.len() as f64, [&work.lanes, &work.serial]);
     let records: f64 = sets.iter().map(|batches| batches.bytes() as f64).sum();

@@ -75,11 +75,13 @@ impl Scene {
     }
 
     /// A world with these bodies, in their order. Gravity, step and length unit are those of the scene,
-    /// everything else is from `settings`. Errors: as [`Scene::validate`].
+    /// everything else is from `settings`. Errors: as [`Scene::validate`] and [`Settings::check`].
     pub fn build(&self, settings: Settings) -> Result<World, Error> {
         let bodies = self.body_defs()?;
         let (gravity, length_unit) = (self.gravity.map(|g| g as f32), self.length_unit as f32);
-        let mut world = World::new(Settings { gravity, dt: self.dt as f32, length_unit, ..settings });
+        let settings = Settings { gravity, dt: self.dt as f32, length_unit, ..settings };
+        settings.check()?;
+        let mut world = World::new(settings);
         self.check_joints()?;
         let handles = bodies.iter().map(|body| world.add_body(body)).collect::<Result<Vec<_>, _>>()?;
         for joint in self.joint_defs(&handles) {

@@ -45,7 +45,7 @@ impl SceneClass {
         let slop = LINEAR_SLOP * world.settings.length_unit;
         let (mut held, mut flush) = (vec![false; world.bodies.len()], true);
         Overlaps::default().find(&world, |pair, manifold| {
-            pair.into_iter().for_each(|shape| held[world.shape_body[shape as usize] as usize] = true);
+            pair.into_iter().for_each(|shape| held[world.shape_body()[shape as usize] as usize] = true);
             flush &= manifold.points().iter().all(|point| point.separation >= -slop);
         });
         for (_, joint) in world.joints() {

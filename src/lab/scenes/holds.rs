@@ -157,7 +157,7 @@ impl SceneMonitor {
         let mut touching = Vec::new();
         if demands.iter().any(|d| matches!(d, Demand::Stands)) {
             Overlaps::default().find(world, |pair, _| {
-                touching.push(pair.map(|shape| world.shape_body[shape as usize] as usize));
+                touching.push(pair.map(|shape| world.shape_body()[shape as usize] as usize));
             });
         }
         touching.sort();
@@ -289,7 +289,7 @@ impl Walls {
     fn of(world: &World, one: Option<usize>) -> Self {
         let bodies = &world.bodies;
         let mut edges = Vec::new();
-        for (shape, &body) in world.shapes.iter().zip(&world.shape_body) {
+        for (shape, &body) in world.shapes().iter().zip(world.shape_body()) {
             let i = body as usize;
             if one.map_or(bodies.kind[i] != BodyKind::Static, |own| own != i) {
                 continue;

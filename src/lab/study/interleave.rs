@@ -23,7 +23,7 @@
 
 use super::sample::{LoadSum, Sample, median, quantile};
 use crate::engine::clock::{Phase, waited};
-use crate::engine::world::{Divergence, Settings, World};
+use crate::engine::world::{Divergence, Settings, StepError, World};
 use crate::lab::error::Error;
 use crate::lab::scenes::Scene;
 use rand::SeedableRng;
@@ -224,7 +224,7 @@ impl Timing {
     fn timed(&mut self, world: &mut World, long: bool) -> (f64, f64) {
         let before = if long { waited() } else { None };
         let start = Instant::now();
-        self.failure = world.step().err();
+        self.failure = world.step().err().and_then(StepError::divergence);
         let elapsed = start.elapsed();
         let pause = match before {
             Some(before) => waited().unwrap_or(before).saturating_sub(before).min(elapsed),
@@ -237,7 +237,7 @@ impl Timing {
     /// One step with all phases timed.
     fn clocked(&mut self, world: &mut World) {
         world.settings.timed = true;
-        self.failure = world.step().err();
+        self.failure = world.step().err().and_then(StepError::divergence);
         self.load.add(&world.counts);
         for (times, &ns) in self.phases.iter_mut().zip(&world.timings.phase_ns) {
             times.push(ns as f64);

@@ -194,12 +194,12 @@ impl<'c> Judge<'c> {
     fn deepest(&self) -> (f64, usize) {
         let (mut deepest, world) = ((0.0, 0), &self.mirror);
         Overlaps::default().find(world, |pair, manifold| {
-            let thin = |s: u32| f64::from(world.shapes[s as usize].min_half_extent());
+            let thin = |s: u32| f64::from(world.shapes()[s as usize].min_half_extent());
             // A line has no width.
             let half = pair.map(thin).into_iter().filter(|w| *w > 0.0).fold(f64::INFINITY, f64::min);
             let depth = manifold.points().iter().map(|p| f64::from(-p.separation)).fold(0.0, f64::max);
             if depth / half > deepest.0 {
-                deepest = (depth / half, world.shape_body[pair[1] as usize] as usize);
+                deepest = (depth / half, world.shape_body()[pair[1] as usize] as usize);
             }
         });
         deepest

@@ -79,7 +79,7 @@ pub use lab::Lab;
 pub use runner::{Cell, VerifyMatrix, run, select};
 
 use crate::engine::solvers::Variant;
-use crate::engine::world::Divergence;
+use crate::engine::world::{Divergence, StepError};
 use crate::lab::error::Error;
 use std::sync::LazyLock;
 
@@ -274,9 +274,12 @@ pub enum Failure {
     Refused(#[from] Error),
 }
 
-impl From<Divergence> for Failure {
-    fn from(divergence: Divergence) -> Self {
-        Failure::Diverged(divergence)
+impl From<StepError> for Failure {
+    fn from(error: StepError) -> Self {
+        match error {
+            StepError::Settings(error) => Failure::Refused(error.into()),
+            StepError::Diverged(divergence) => Failure::Diverged(divergence),
+        }
     }
 }
 

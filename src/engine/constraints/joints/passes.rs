@@ -3,7 +3,7 @@
 use super::rows::{JointPair, JointPass, VELOCITY, dot};
 use crate::constraints::kernels::frame::{DX, DY, TURN};
 use crate::constraints::kernels::pass::VectorTask;
-use crate::constraints::kernels::velocity::rules::Softness;
+use crate::constraints::kernels::velocity::rules::{Softness, bounded_errors};
 use crate::constraints::numerics::small::solve;
 use crate::constraints::records::rows::{Jacobian, ROWS, RowBlock, RowLaw};
 use crate::lanes::Lanes;
@@ -93,6 +93,11 @@ impl<L: Lanes, P: JointPass<L> + DerefMut> JointPass<L> for Besides<L, P> {
             }
         }
     }
+
+    #[inline(always)]
+    fn free_row(&mut self, j: Jacobian<L>, error: L, law: RowLaw<L>, kept: &mut [L], ease: L) {
+        self.of.free_row(j, error, law, kept, ease);
+    }
 }
 
 /// How velocities are solved.
@@ -113,6 +118,26 @@ pub(super) struct VelocityRule {
 impl<L: Lanes> JointPass<L> for Velocities<L> {
     #[inline(always)]
     fn block<const N: usize>(&mut self, j: [Jacobian<L>; N], error: [L; N], law: RowLaw<L>, kept: &mut [L]) {
+        self.solve(j, error, law, kept, L::splat(1.0));
+    }
+
+    #[inline(always)]
+    fn free_row(&mut self, j: Jacobian<L>, error: L, law: RowLaw<L>, kept: &mut [L], ease: L) {
+        self.solve([j], [error], law, kept, ease);
+    }
+}
+
+impl<L: Lanes> Velocities<L> {
+    /// Solves a block with the response K/`ease`.
+    #[inline(always)]
+    fn solve<const N: usize>(
+        &mut self,
+        j: [Jacobian<L>; N],
+        error: [L; N],
+        law: RowLaw<L>,
+        kept: &mut [L],
+        ease: L,
+    ) {
         let (impulse, held) = kept.split_at_mut(N);
         let VelocityRule { law: solver, relaxing, relaxation, inv_h, acts } = self.by;
         let drives = matches!(law, RowLaw::Motor { .. } | RowLaw::Spring { .. });
@@ -129,8 +154,12 @@ impl<L: Lanes> JointPass<L> for Velocities<L> {
             L::splat(solver.mass_scale),
         ];
         let [alpha, p, q] = match law {
-            RowLaw::Rigid => rigid,
+            RowLaw::Rigid => {
+                error = solver.pushed(&j, error);
+                rigid
+            }
             RowLaw::Limit => {
+                error[0] = error[0].select_positive(error[0], solver.pushed(&j, error)[0]);
                 let open = [one, L::splat(inv_h), one];
                 let of = |i: usize| error[0].select_positive(open[i], rigid[i]);
                 [of(0), of(1), of(2)]
@@ -154,7 +183,7 @@ impl<L: Lanes> JointPass<L> for Velocities<L> {
         for i in 0..N {
             x[i] = p.mul_add(error[i], q * (self.pair.rate(&j[i], VELOCITY) - speed));
         }
-        let x = self.pair.solved(&j, x);
+        let x = self.pair.solved(&j, x).map(|x| x * ease);
         let mut new = x;
         for i in 0..N {
             let line = alpha.mul_add(impulse[i], -x[i]);
@@ -194,7 +223,8 @@ pub(super) enum DisplacementRule {
     },
     /// By displacements that remove the errors.
     Position {
-        /// Largest correction of a length (m), and of an angle (rad).
+        /// Largest correction of a length (m), and of an angle (rad). Where displacements count as impulses, velocities come
+        /// from corrections as well, and only what was wrong before the substep moved the bodies is bounded.
         max_correction: [f32; 2],
         /// 1/h if displacements count as impulses (1/s), otherwise 0.
         inv_h: f32,
@@ -204,6 +234,26 @@ pub(super) enum DisplacementRule {
 impl<L: Lanes> JointPass<L> for Displacements<L> {
     #[inline(always)]
     fn block<const N: usize>(&mut self, j: [Jacobian<L>; N], error: [L; N], law: RowLaw<L>, kept: &mut [L]) {
+        self.solve(j, error, law, kept, L::splat(1.0));
+    }
+
+    #[inline(always)]
+    fn free_row(&mut self, j: Jacobian<L>, error: L, law: RowLaw<L>, kept: &mut [L], ease: L) {
+        self.solve([j], [error], law, kept, ease);
+    }
+}
+
+impl<L: Lanes> Displacements<L> {
+    /// Solves a block with the response K/`ease`.
+    #[inline(always)]
+    fn solve<const N: usize>(
+        &mut self,
+        j: [Jacobian<L>; N],
+        error: [L; N],
+        law: RowLaw<L>,
+        kept: &mut [L],
+        ease: L,
+    ) {
         let impulse = &mut kept[..N];
         match self.by {
             DisplacementRule::Push { law: solver } => {
@@ -213,11 +263,12 @@ impl<L: Lanes> JointPass<L> for Displacements<L> {
                     RowLaw::Limit => true,
                     RowLaw::Motor { .. } | RowLaw::Spring { .. } => return,
                 };
+                let pushed = solver.pushed(&j, error);
                 for i in 0..N {
-                    let bias = L::splat(solver.bias_rate) * error[i];
+                    let bias = L::splat(solver.bias_rate) * pushed[i];
                     x[i] = L::splat(-solver.mass_scale) * (self.pair.rate(&j[i], VELOCITY) + bias);
                 }
-                let mut x = self.pair.solved(&j, x);
+                let mut x = self.pair.solved(&j, x).map(|x| x * ease);
                 if is_limit {
                     x[0] = error[0].select_positive(L::zero(), x[0].max(L::zero()));
                 }
@@ -232,12 +283,25 @@ impl<L: Lanes> JointPass<L> for Displacements<L> {
                     RowLaw::Limit => x[0] = x[0].min(L::zero()),
                     RowLaw::Motor { .. } | RowLaw::Spring { .. } => return,
                 }
-                let [of_length, of_angle] = max_correction.map(L::splat);
-                for (x, j) in x.iter_mut().zip(&j) {
-                    let bound = j.select(of_length, of_angle);
-                    *x = (-*x).min(bound).max(-bound);
+                if inv_h > 0.0 {
+                    let old = std::array::from_fn(|i| {
+                        L::splat(1.0 / inv_h).neg_mul_add(self.pair.rate(&j[i], VELOCITY), x[i])
+                    });
+                    let bounded = bounded_errors(&j, old, max_correction);
+                    for i in 0..N {
+                        // No farther than to the other side.
+                        let rest = x[i] - (old[i] - bounded[i]);
+                        let same_side = (rest * x[i]).select_positive(rest, L::zero());
+                        x[i] = -(x[i] * x[i] - rest * rest).select_positive(same_side, x[i]);
+                    }
+                } else {
+                    let [of_length, of_angle] = max_correction.map(L::splat);
+                    for (x, j) in x.iter_mut().zip(&j) {
+                        let bound = j.select(of_length, of_angle);
+                        *x = (-*x).min(bound).max(-bound);
+                    }
                 }
-                let x = self.pair.solved(&j, x);
+                let x = self.pair.solved(&j, x).map(|x| x * ease);
                 for i in 0..N {
                     self.pair.apply(&j[i], x[i], [DX, DY, TURN]);
                     impulse[i] = L::splat(inv_h).mul_add(x[i], impulse[i]);
@@ -307,11 +371,13 @@ impl<L: Lanes> JointPass<L> for Vectors<'_, L> {
                 }
             }
             VectorTask::Bias => {
-                let rigid = L::splat(solver.bias_rate);
+                let (rigid, pushed) = (L::splat(solver.bias_rate), solver.pushed(&j, error));
                 for i in 0..N {
                     x[at(i)] = match law {
-                        RowLaw::Rigid => rigid * error[i],
-                        RowLaw::Limit => error[i].select_positive(L::splat(*inv_h), rigid) * error[i],
+                        RowLaw::Rigid => rigid * pushed[i],
+                        RowLaw::Limit => {
+                            error[i].select_positive(L::splat(*inv_h) * error[i], rigid * pushed[i])
+                        }
                         RowLaw::Motor { speed, .. } => -speed,
                         RowLaw::Spring { stiffness, damping, .. } => {
                             stiffness / damping.max(least) * error[i]

@@ -18,7 +18,8 @@
 //! ```text
 //! λ ← α λ − K⁻¹ (p C + q (J v − u))      within its bounds
 //!
-//! rigid          α = 1 − γ_i    p = γ_m β   q = γ_m    β, γ of the solver's rule; 0, 1 without position feedback
+//! rigid          α = 1 − γ_i    p = γ_m β   q = γ_m    β, γ of the solver's rule; 0, 1 without position feedback;
+//!                                                      β C at most the speed at which the rule pushes contacts
 //! limit, C > 0   α = 1          p = 1/h     q = 1      λ ≥ 0; may close and no more
 //! limit, C ≤ 0   as rigid                              λ ≥ 0
 //! motor          α = 1          p = 0       q = 1      |λ| ≤ F h, u is the speed asked for
@@ -87,7 +88,24 @@ pub trait JointPass<L: Lanes>: Deref<Target = JointPair<L>> {
     fn row(&mut self, j: Jacobian<L>, error: L, law: RowLaw<L>, kept: &mut [L]) {
         self.block([j], [error], law, kept);
     }
+
+    /// A row along a coordinate that other, rigid rows of the joint leave free. `ease` is K/K_f, see
+    /// [`JointPair::ease`]. Sweeps solve it with K_f, so that it and the rigid rows converge in two sweeps; where only the
+    /// law counts, a spring of K has S and D of that factor.
+    #[inline(always)]
+    fn free_row(&mut self, j: Jacobian<L>, error: L, law: RowLaw<L>, kept: &mut [L], ease: L) {
+        let law = match law {
+            RowLaw::Spring { stiffness, damping, cap } => {
+                RowLaw::Spring { stiffness: stiffness * ease, damping: damping * ease, cap }
+            }
+            other => other,
+        };
+        self.block([j], [error], law, kept);
+    }
 }
+
+/// Least K_f/K, against rounding (1).
+const LEAST_FREE: f32 = 1e-5;
 
 /// Velocities in a row of a body.
 pub(super) const VELOCITY: [usize; 3] = [VX, VY, W];
@@ -163,6 +181,16 @@ impl<L: Lanes> JointPair<L> {
         ([add(start[0], moved[0]), add(start[1], moved[1])], offset)
     }
 
+    /// Rows of the vector from a's anchor to b's, and that vector (m).
+    ///
+    /// Both bodies are pushed at the anchor of b. Pushed at anchors that are apart by C, they would get the couple C × λ from
+    /// within. These rows have the rate Ċ − ω_a × C, that of C in the frame of a, so |C| changes as the rows say.
+    #[inline(always)]
+    pub fn point(&self) -> ([Jacobian<L>; 2], [L; 2]) {
+        let ([ra, rb], offset) = self.anchors();
+        (Jacobian::point([add(ra, offset), rb]), offset)
+    }
+
     /// J x, where x are the velocities or the displacements at these places of the body rows.
     #[inline(always)]
     pub(super) fn rate(&self, j: &Jacobian<L>, [x, y, w]: [usize; 3]) -> L {
@@ -192,17 +220,38 @@ impl<L: Lanes> JointPair<L> {
     /// The lower half of K.
     #[inline(always)]
     pub(super) fn response<const N: usize>(&self, j: &[Jacobian<L>; N]) -> [[L; N]; N] {
-        let [a, b] = &self.bodies;
-        let (mass, ia, ib) = (a[INV_MASS] + b[INV_MASS], a[INV_INERTIA], b[INV_INERTIA]);
         let mut k = [[L::zero(); N]; N];
         for r in 0..N {
             for c in 0..=r {
-                let by_turning =
-                    (ia * j[r].arms[0]).mul_add(j[c].arms[0], (ib * j[r].arms[1]) * j[c].arms[1]);
-                k[r][c] = mass.mul_add(dot(j[r].axis, j[c].axis), by_turning);
+                k[r][c] = self.coupling(&j[r], &j[c]);
             }
         }
         k
+    }
+
+    /// J_r M⁻¹ J_cᵀ
+    #[inline(always)]
+    fn coupling(&self, r: &Jacobian<L>, c: &Jacobian<L>) -> L {
+        let [a, b] = &self.bodies;
+        let (mass, ia, ib) = (a[INV_MASS] + b[INV_MASS], a[INV_INERTIA], b[INV_INERTIA]);
+        let by_turning = (ia * r.arms[0]).mul_add(c.arms[0], (ib * r.arms[1]) * c.arms[1]);
+        mass.mul_add(dot(r.axis, c.axis), by_turning)
+    }
+
+    /// K/K_f of a row beside rigid rows, where K_f is its response while they hold: K_f = K − cᵀ P⁻¹ c with the response P of
+    /// the rigid rows and their coupling c to this row. A rod hinged at its end turns by a quarter of what it would turn by
+    /// alone, so its factor is 4.
+    #[inline(always)]
+    pub fn ease<const N: usize>(&self, j: &Jacobian<L>, rigid: &[Jacobian<L>; N]) -> L {
+        let couplings = rigid.each_ref().map(|held| self.coupling(held, j));
+        let answers = self.solved(rigid, couplings);
+        let mut taken = L::zero();
+        for i in 0..N {
+            taken = couplings[i].mul_add(answers[i], taken);
+        }
+        let k = self.coupling(j, j);
+        let free = (k - taken).max(k * L::splat(LEAST_FREE));
+        free.select_positive(k / free, L::splat(1.0))
     }
 
     /// K⁻¹ x

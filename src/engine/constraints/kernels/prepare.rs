@@ -68,7 +68,7 @@ fn prepare_segment<L: Lanes, N: KernelFeatures, O: Partner>(
                     L::gather_quads::<STRIDE, STATE_1>(quads, index),
                 )
             };
-            // Counts are integers and are compared as the bits of floats.
+            // Counts are integers.
             let active = if p == 0 {
                 count.select_equal(L::zero(), L::zero(), present)
             } else {

@@ -30,6 +30,14 @@ pub trait Solver: CloneSolver + fmt::Debug + Send {
 
     /// All passes of one step.
     fn step(&mut self, passes: &mut Passes<'_>);
+
+    /// Numbers that it keeps from step to step besides [`SolverState`], for saved worlds.
+    fn kept(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// Takes the numbers of [`Self::kept`]; those of another solver, or of other bodies, are ignored.
+    fn set_kept(&mut self, _kept: &[f64]) {}
 }
 
 /// A copy of a solver, with all data that it keeps. Every solver that is `Clone` has it.

@@ -3,6 +3,7 @@
 use crate::clock::Phase;
 use crate::constraints::kernels::pass::PassMode;
 use crate::constraints::kernels::types::BodyStates;
+use crate::constraints::kernels::velocity::rules::Softness;
 use crate::constraints::records::rows::{ROWS, RowBlock, RowLaw};
 use crate::constraints::vectors::system::System;
 
@@ -48,13 +49,14 @@ impl RowBlock {
         [j.axis[0], j.axis[1], j.arms[side]].map(|x| sign * f64::from(x))
     }
 
-    /// b of J v + b + R λ = 0, see `constraints/joints/rows.rs`. `rate` is β of rigid rows (1/s).
-    pub fn bias(&self, rate: f32, h: f32) -> [f32; ROWS] {
-        self.errors.map(|error| match self.law {
-            RowLaw::Rigid => rate * error,
-            RowLaw::Limit => error * if error > 0.0 { 1.0 / h } else { rate },
+    /// b of J v + b + R λ = 0, see `constraints/joints/rows.rs`. `rigid` is the softness of rigid rows.
+    pub fn bias(&self, rigid: Softness, h: f32) -> [f32; ROWS] {
+        let pushed = rigid.pushed(&self.jacobians, self.errors);
+        std::array::from_fn(|r| match self.law {
+            RowLaw::Limit if self.errors[r] > 0.0 => self.errors[r] / h,
+            RowLaw::Rigid | RowLaw::Limit => rigid.bias_rate * pushed[r],
             RowLaw::Motor { speed, .. } => -speed,
-            RowLaw::Spring { stiffness, damping, .. } => stiffness / damping.max(1e-9) * error,
+            RowLaw::Spring { stiffness, damping, .. } => stiffness / damping.max(1e-9) * self.errors[r],
         })
     }
 

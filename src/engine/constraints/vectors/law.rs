@@ -1,6 +1,7 @@
 //! The contact law of an island around given impulses: the natural map and its norm, the linear problem for
 //! fixed states, a sweep, Lemke's method. See [`crate::solvers::direct`].
 
+use crate::constraints::kernels::velocity::rules::Softness;
 use crate::constraints::numerics::block_lu::{BlockLu, inverse};
 use crate::constraints::numerics::cone;
 use crate::constraints::numerics::coulomb_lcp::CoulombLcp;
@@ -175,8 +176,8 @@ impl IslandLaw {
     }
 
     /// Adds the rows of a joint block.
-    pub fn join(&mut self, bodies: &[BodyRow], block: &RowBlock, rate: f32, h: f32) {
-        let (bias, softness) = (block.bias(rate, h), f64::from(block.softness()));
+    pub fn join(&mut self, bodies: &[BodyRow], block: &RowBlock, rigid: Softness, h: f32) {
+        let (bias, softness) = (block.bias(rigid, h), f64::from(block.softness()));
         let first = self.rows.len();
         let mut r = block.response.map(|row| row.map(|x| softness * f64::from(x)));
         for (k, bias) in bias.into_iter().enumerate().take(block.size) {

@@ -93,6 +93,25 @@ impl JointDescent {
         }
     }
 
+    /// Bodies and penalties of all blocks, five numbers each.
+    pub fn kept(&self) -> Vec<f64> {
+        let of = |(bodies, block): (&[u32; 2], &KeptBlock)| {
+            bodies.map(f64::from).into_iter().chain(block.penalty.map(f64::from))
+        };
+        self.bodies.iter().zip(&self.blocks).flat_map(of).collect()
+    }
+
+    /// Takes the numbers of [`Self::kept`].
+    pub fn set_kept(&mut self, kept: &[f64]) {
+        let blocks = kept.as_chunks::<{ 2 + ROWS }>().0;
+        self.bodies = blocks.iter().map(|&[a, b, ..]| [a as u32, b as u32]).collect();
+        let block = |&[_, _, x, y, z]: &[f64; 5]| KeptBlock {
+            penalty: [x, y, z].map(|x| x as f32),
+            ..KeptBlock::default()
+        };
+        self.blocks = blocks.iter().map(block).collect();
+    }
+
     /// Collects the blocks of `joint` at the current positions of bodies; returns their range in `blocks`.
     fn collect(&mut self, joint: usize, on: &mut DescentInput<'_>) -> std::ops::Range<usize> {
         let [t, i] = self.places[joint];

@@ -25,7 +25,7 @@
 //! linear as well, and Newton's method ends after finitely many steps.
 
 use crate::constraints::System;
-use crate::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
+use crate::constraints::kernels::velocity::rules::{Baumgarte, NormalRule, Softness};
 use crate::constraints::numerics::cone;
 use crate::constraints::numerics::envelope::{Couplings, Envelope};
 use crate::constraints::records::rows::{RowBlock, RowLaw};
@@ -295,7 +295,7 @@ impl Convex {
             problem.joints = system.joint_blocks();
             for k in 0..problem.joints.blocks.len() {
                 let block = problem.joints.blocks[k];
-                let block = problem.of_joint(system.rows(), &numbers, &block, rule.of_errors().bias_rate, h);
+                let block = problem.of_joint(system.rows(), &numbers, &block, rule.of_errors(), h);
                 problem.blocks.push(block);
             }
         }
@@ -333,7 +333,7 @@ impl Convex {
         rows: &[BodyRow],
         numbers: &[usize],
         joint: &RowBlock,
-        rate: f32,
+        rigid: Softness,
         h: f32,
     ) -> ConvexBlock {
         let mut jacobian = [[[0.0; 3]; 3]; 2];
@@ -345,7 +345,7 @@ impl Convex {
             (_, Some(cap)) => ImpulseBound::Norm(f64::from(cap)),
             _ => ImpulseBound::Free,
         };
-        let target = joint.bias(rate, h).map(|b| -f64::from(b));
+        let target = joint.bias(rigid, h).map(|b| -f64::from(b));
         let mut block = self.placed(rows, numbers, (joint.bodies, joint.size), jacobian, target, bound);
         let scale = f64::from(joint.softness()).max(RIGID);
         let largest = (0..joint.size).map(|r| f64::from(joint.response[r][r])).fold(0.0, f64::max);

@@ -39,6 +39,7 @@ use crate::constraints::records::features::{
 };
 use crate::constraints::records::point_vector::places;
 use crate::lanes::{Block, BodyRow, LaneIndex, Lanes, RowStore};
+use crate::params::MAX_PUSH_SPEED;
 
 /// Displaces bodies; see the [module](self).
 #[derive(Clone, Copy, Debug)]
@@ -98,7 +99,8 @@ impl Pass for Approach<'_> {
 
 impl Pass for Displace<'_> {
     fn mode(&self) -> PassMode {
-        PassMode::Position { max_correction: [f32::INFINITY; 2], impulses: true }
+        let max_correction = [self.push_speed, MAX_PUSH_SPEED].map(|speed| speed * self.h);
+        PassMode::Position { max_correction, impulses: true }
     }
 
     #[inline(never)]

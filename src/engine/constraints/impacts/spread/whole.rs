@@ -19,6 +19,7 @@
 use super::point::{HitPoint, PropagationInput, Role, STILL};
 use super::{BOUNCES, ImpactPropagation, NONE};
 use crate::constraints::kernels::types::{BodyStates, ConstraintSet};
+use crate::constraints::kernels::velocity::rules::Softness;
 use crate::constraints::numerics::cone;
 use crate::constraints::records::rows::{RowBlock, RowLaw};
 use crate::constraints::vectors::law::IslandLaw;
@@ -304,7 +305,7 @@ impl ImpactPropagation {
             let surfaces: Vec<_> = all.clone().map(|i| [of(i).separation, of(i).friction]).collect();
             let mut law = IslandLaw::new(rows, on.rows, &impulses, &velocities, &surfaces);
             for block in &self.joints.blocks {
-                law.join(on.rows, block, 0.0, on.dt);
+                law.join(on.rows, block, Softness::RIGID, on.dt);
             }
             let mut island = Island::new(law);
             self.visits += places.len();

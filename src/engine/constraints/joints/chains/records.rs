@@ -9,11 +9,9 @@ use crate::constraints::records::batches::VisitedRecord;
 use crate::constraints::records::links::{ChainLink, LINK_LANES, LinkImpulses, LinkRows, LinkRule};
 use crate::lanes::{BodyRow, Indices, LaneIndex, Lanes, RowStore};
 use crate::narrowphase::lanes::PoseRow;
+use crate::params::MAX_PUSH_SPEED;
 use std::ops::{Deref, DerefMut};
 use wide::f32x8;
-
-/// Speed limit for removing the error of a joint (length units or rad per second).
-const MOST_SPEED: f32 = 10.0;
 
 /// Links of one type, in batches of one group each.
 #[derive(Clone, Debug, Default)]
@@ -230,7 +228,7 @@ impl JointPass<f32x8> for LinkPass<'_> {
         }
         let LinkPass { pair, way, by, to } = self;
         let (way, inv_h, unit) = (*way, f32x8::splat(by.inv_h), f32x8::splat(by.length_unit));
-        let most = f32x8::splat(MOST_SPEED) * unit;
+        let most = f32x8::splat(MAX_PUSH_SPEED) * unit;
         let is_link = way * way;
         // Selected by products: for selections, the compiler makes masked stores, which are slow.
         let others = f32x8::ONE - is_link;

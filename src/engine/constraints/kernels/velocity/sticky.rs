@@ -93,7 +93,8 @@ pub(crate) struct StoreDrift<'a> {
 
 impl Pass for StickySweep<'_> {
     fn law(&self) -> Softness {
-        Softness { bias_rate: self.sticky.fraction / self.sticky.h, ..Softness::RIGID }
+        let Sticky { h, fraction, push_speed, .. } = self.sticky;
+        Softness { bias_rate: fraction / h, push_speed, ..Softness::RIGID }
     }
 
     #[inline(never)]

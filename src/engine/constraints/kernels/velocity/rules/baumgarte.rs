@@ -52,7 +52,7 @@ impl NormalRule for Baumgarte {
     const FRICTION: bool = true;
 
     fn of_errors(&self) -> Softness {
-        Softness { bias_rate: self.rate, ..Softness::RIGID }
+        Softness { bias_rate: self.rate, push_speed: self.push_speed, ..Softness::RIGID }
     }
 
     #[inline(always)]

@@ -12,7 +12,7 @@ mod variations;
 pub use crate::constraints::kernels::velocity::sweep::NormalRule;
 pub use baumgarte::Baumgarte;
 pub use rigid::Rigid;
-pub use soft::{Bearing, Soft, Softness, angular_frequencies};
+pub use soft::{Bearing, Soft, Softness, angular_frequencies, bounded_errors};
 pub use touching::Touching;
 pub use variations::{Frictionless, Relaxed, Turned};
 

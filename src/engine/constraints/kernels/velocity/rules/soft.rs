@@ -2,7 +2,9 @@
 
 use super::{Frictionless, Rule, Turned};
 use crate::constraints::kernels::velocity::sweep::{NormalRule, Sweep};
+use crate::constraints::records::rows::Jacobian;
 use crate::lanes::Lanes;
+use crate::params::MAX_PUSH_SPEED;
 use std::f32::consts::TAU;
 
 /// The coefficients of a spring of angular frequency ω and damping ratio ζ, integrated
@@ -20,25 +22,58 @@ pub struct Softness {
     pub mass_scale: f32,
     /// γ_i (1)
     pub impulse_scale: f32,
+    /// Largest speed at which an error of a joint is pushed out (m/s).
+    pub push_speed: f32,
 }
 
 impl Softness {
     /// No position feedback.
-    pub const RIGID: Softness = Softness { bias_rate: 0.0, mass_scale: 1.0, impulse_scale: 0.0 };
+    pub const RIGID: Softness =
+        Softness { bias_rate: 0.0, mass_scale: 1.0, impulse_scale: 0.0, push_speed: f32::INFINITY };
 
     /// Critically damped at ω = 2/h, from 1/h: half of an error is removed per substep. One Gauss–Seidel
     /// sweep per substep is stable for chains of joints and mass ratios of 1 : 700 up to ω h ≤ 2.2; from 2.4
     /// on they buzz (`papers/joints.md`).
-    pub fn stiffest(inv_h: f32) -> Self {
-        Softness { bias_rate: 0.5 * inv_h, mass_scale: 8.0 / 9.0, impulse_scale: 1.0 / 9.0 }
+    pub fn stiffest(inv_h: f32, push_speed: f32) -> Self {
+        Softness { bias_rate: 0.5 * inv_h, mass_scale: 8.0 / 9.0, impulse_scale: 1.0 / 9.0, push_speed }
     }
 
     /// A spring of `omega` (rad/s) and `damping_ratio` (1) integrated over `h` (s).
     pub fn new(omega: f32, damping_ratio: f32, h: f32) -> Self {
         let denominator = 2.0 * damping_ratio + h * omega;
         let a = h * omega * denominator;
-        Softness { bias_rate: omega / denominator, mass_scale: a / (1.0 + a), impulse_scale: 1.0 / (1.0 + a) }
+        let (bias_rate, mass_scale) = (omega / denominator, a / (1.0 + a));
+        Softness { bias_rate, mass_scale, impulse_scale: 1.0 / (1.0 + a), ..Self::RIGID }
     }
+
+    /// The errors of a rigid block (m or rad), reduced such that β C is at most the push speed, and [`MAX_PUSH_SPEED`] rad/s
+    /// for angles. Joints that begin far out of reach would otherwise shoot together.
+    #[inline(always)]
+    pub fn pushed<L: Lanes, const N: usize>(&self, j: &[Jacobian<L>; N], errors: [L; N]) -> [L; N] {
+        if self.bias_rate == 0.0 {
+            return errors;
+        }
+        let reach = self.push_speed / self.bias_rate;
+        bounded_errors(j, errors, [reach, MAX_PUSH_SPEED / self.bias_rate])
+    }
+}
+
+/// Errors of a block (m or rad), reduced to a vector of at most `most[0]` (m) and angles of at most `most[1]` (rad).
+#[inline(always)]
+pub fn bounded_errors<L: Lanes, const N: usize>(
+    j: &[Jacobian<L>; N],
+    errors: [L; N],
+    most: [f32; 2],
+) -> [L; N] {
+    let [of_length, of_angle] = most.map(L::splat);
+    let mut square = L::zero();
+    for i in 0..N {
+        let length = j[i].select(errors[i], L::zero());
+        square = length.mul_add(length, square);
+    }
+    let distance = square.sqrt();
+    let scale = (distance - of_length).select_positive(of_length / distance, L::splat(1.0));
+    std::array::from_fn(|i| j[i].select(errors[i] * scale, errors[i].min(of_angle).max(-of_angle)))
 }
 
 /// ω of contacts between dynamic bodies, and of contacts with static and kinematic bodies (rad/s), for a
@@ -83,7 +118,7 @@ impl Soft {
     /// Rigid rows that remove `fraction` of an overlap in each substep of `h` (s), at no more than
     /// `push_speed` (m/s). No slop.
     pub fn baumgarte(fraction: f32, push_speed: f32, h: f32) -> Self {
-        let stiff = Softness { bias_rate: fraction / h, mass_scale: 1.0, impulse_scale: 0.0 };
+        let stiff = Softness { bias_rate: fraction / h, ..Softness::RIGID };
         Soft { inv_h: 1.0 / h, dynamic: stiff, against_static: stiff, push_speed }
     }
 
@@ -103,7 +138,7 @@ impl NormalRule for Soft {
     const FRICTION: bool = true;
 
     fn of_errors(&self) -> Softness {
-        self.against_static
+        Softness { push_speed: self.push_speed, ..self.against_static }
     }
 
     #[inline(always)]
@@ -141,7 +176,7 @@ impl NormalRule for Bearing {
     const FRICTION: bool = Soft::FRICTION;
 
     fn of_errors(&self) -> Softness {
-        Softness::stiffest(self.springs.inv_h)
+        Softness::stiffest(self.springs.inv_h, self.springs.push_speed)
     }
 
     #[inline(always)]
