@@ -14,6 +14,7 @@ use crate::lab::files::same_file;
 use crate::lab::memory;
 use crate::lab::metrics::Errors;
 use crate::lab::overrides;
+use crate::lab::pokes;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::table::error_list;
 use crate::lab::report::units::{bodies, lanes, ratio, si};
@@ -39,6 +40,7 @@ Examples:
   simpulse run my.json --steps 600 --state out.csv --contacts contacts.csv --every 60
   simpulse run crane --joints joints.csv --every 1
   simpulse run pyramid:20 --picture pyramid.svg --step 120
+  simpulse run stack:20 --steps 1200 --poke 1              does it survive a player?
   simpulse run stack:12 --solvers pgs,soft_step --record replay.html --record-contacts")]
 pub struct RunArgs {
     /// Scene
@@ -84,6 +86,10 @@ pub struct RunArgs {
     /// Continuous collision: stop fast bodies at the surfaces that they would pass through [default: the solver's]
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pub continuous: Option<bool>,
+    /// Push random bodies at random times in the first half of the run, as a player would; the seed decides which and
+    /// when. The figures are those of the poked run, and bodies are compared with an unpoked one
+    #[arg(long, value_name = "SEED", conflicts_with_all = ["picture", "record"])]
+    pub poke: Option<u64>,
     /// Print all phases, counts and errors
     #[arg(long)]
     pub all: bool,
@@ -98,9 +104,20 @@ struct RunResult {
     errors: Errors,
     truth: Option<TruthError>,
     broken: Option<Broken>,
+    poked: Option<Poked>,
     unchecked: Vec<String>,
     /// Whether the scene must come to rest.
     rests: bool,
+}
+
+/// What random pushes did.
+#[derive(serde::Serialize)]
+struct Poked {
+    seed: u64,
+    pushes: u32,
+    /// Distance at the end from the bodies of a run without pushes: root mean square, and greatest (m).
+    displaced_rms_m: f64,
+    displaced_max_m: f64,
 }
 
 /// A note about bodies whose size is far from the length unit.
@@ -150,7 +167,12 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     memory::check("run", scene.bodies.len(), 0, 1)?;
     let mut sheets = Sheets::new(args)?;
     let bar = Bar::new();
-    let trial = Trial { demands: demands.clone(), truth: truth.as_mut(), ..Trial::new(scene, settings) };
+    let trial = Trial {
+        demands: demands.clone(),
+        truth: truth.as_mut(),
+        poked: args.poke,
+        ..Trial::new(scene, settings.clone())
+    };
     let found = trial.run(&mut |world| {
         if world.step_index == 0 {
             note(&size_note(world).unwrap_or_default());
@@ -170,10 +192,18 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     // Metrics evict the caches, so times come from separate runs. Equal bits show that these did the same
     // work.
     let own = Settings { record_impulses: false, ..found.world.settings.clone() };
-    let times = Times::measure(scene, own, found.world.state_hash())?;
+    let (poked, hash) = match args.poke {
+        Some(seed) => {
+            let still = Trial { measured: 0, ..Trial::new(scene, settings) }.run(&mut |_| Ok(()))?.world;
+            let [displaced_rms_m, displaced_max_m] = pokes::displacement(&found.world, &still);
+            (Some(Poked { seed, pushes: found.pokes, displaced_rms_m, displaced_max_m }), still.state_hash())
+        }
+        None => (None, found.world.state_hash()),
+    };
+    let times = Times::measure(scene, own, hash)?;
     let TrialOutcome { world, errors, truth, broken, .. } = found;
     let errors = errors.ok_or_else(|| Error::invalid("run", "no step was measured"))?;
-    let found = RunResult { times, errors, truth, broken, unchecked: unchecked.clone(), rests };
+    let found = RunResult { times, errors, truth, broken, poked, unchecked: unchecked.clone(), rests };
     let written = sheets.commit()?;
     if args.json {
         return print_json(&json(&world, scene, &found)?);
@@ -277,6 +307,13 @@ impl RunResult {
             ("residual speed, last second", si(e.rest_velocity(), "m/s"), "rms".into()),
             ("energy change", ratio(at("energy_change")), "relative; positive is a gain".into()),
         ]);
+        if let Some(Poked { seed, pushes, displaced_rms_m, displaced_max_m }) = &self.poked {
+            let rest = format!(
+                "rms; greatest {}; {pushes} pushes in the first half, seed {seed}",
+                si(*displaced_max_m, "m")
+            );
+            lines.push(("displaced by pokes", si(*displaced_rms_m, "m"), rest));
+        }
         lines
     }
 
@@ -333,6 +370,7 @@ fn json(world: &World, scene: &Scene, found: &RunResult) -> Result<Value, Error>
         "reference": value(&found.truth)?,
         "holds": found.broken.map_or("yes", |b| b.mark.word()),
         "failed_step": found.broken.map(|b| b.step),
+        "poked": found.poked,
         "not_checked": found.unchecked,
     }))
 }

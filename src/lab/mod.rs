@@ -91,6 +91,7 @@
 //! units  memory  parallel        human-readable numbers; what fits in memory; jobs on threads
 //! reference  metrics             certified solutions; errors read from states
 //! scenes  capture  picture       what is simulated, and its known truth; frozen problems; frames drawn
+//! pokes                          random pushes
 //! trial                          one run to its verdict
 //! recording  chart               whole runs in a file, and the page that plays them; charts as SVG
 //! study  converge  verify        solver × scene × budget; iterations to a tolerance; hard cases
@@ -118,6 +119,7 @@ pub mod overrides;
 #[doc(hidden)]
 pub mod parallel;
 pub mod picture;
+pub mod pokes;
 pub mod profile;
 pub mod recording;
 pub mod reference;
