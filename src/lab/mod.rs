@@ -98,6 +98,7 @@
 //! report                         tables, plots, records
 //! profile  compare               phases against the roofline, cost by size; two studies side by side
 //! ablate                         what each mechanism of a solver is for
+//! view                           worlds side by side, and what a player does to them
 //! torture                        scenes at random, and what no solver may do in them
 //! ```
 
@@ -131,3 +132,4 @@ pub mod trial;
 #[doc(hidden)]
 pub mod units;
 pub mod verify;
+pub mod view;
