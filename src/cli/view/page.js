@@ -22,7 +22,7 @@
   const CURVES = [["overlap", "m"], ["force error (% of a body's weight)", "%"], ["speed", "m/s"]];
 
   let stage = null, all = null, panes = [], newest = null, waiting = 0, drawn = [];
-  let playing = true, speed = 1, version = 0, asked = null, impulses = [];
+  let playing = true, speed = 1, asked = null, impulses = [], counted = 0;
 
   const socket = new WebSocket(`ws://${location.host}${location.pathname}socket`);
   socket.binaryType = "arraybuffer";
@@ -47,15 +47,15 @@
     const status = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 12, length)));
     let at = 12 + length;
     status.frames = status.panes.map(() => {
-      const [bodies, count, islands] = new Uint32Array(buffer, at, 3);
-      const poses = new Float32Array(buffer, at + 12, 3 * bodies);
-      const raw = new Float32Array(buffer, at + 12 + 12 * bodies, 8 * count);
-      at += 12 + 12 * bodies + 32 * count;
+      const [bodies, deep, count, islands] = new Uint32Array(buffer, at, 4);
+      at += 16;
+      const floats = (length) => new Float32Array(buffer, (at += 4 * length) - 4 * length, length);
+      const poses = floats(3 * bodies), depths = deep ? floats(deep) : null, raw = floats(8 * count);
       const points = Array.from({ length: count }, (_, i) => ({
         a: raw[8 * i], b: raw[8 * i + 1], x: raw[8 * i + 2], y: raw[8 * i + 3], separation: raw[8 * i + 4],
         ix: raw[8 * i + 5], iy: raw[8 * i + 6], color: raw[8 * i + 7],
       }));
-      const found = { poses, points, islands: islands ? new Uint32Array(buffer, at, islands) : null };
+      const found = { poses, depths, points, islands: islands ? new Uint32Array(buffer, at, islands) : null };
       at += 4 * islands;
       return found;
     });
@@ -101,7 +101,9 @@
       page.all = all;
     }
     all.carried = [...impulses].sort((a, b) => a - b)[impulses.length >> 1] || 1;
-    const ranges = CURVES.map((_, i) => {
+    // The eye follows bodies, not curves: every third frame has them.
+    const whole = !playing || ++counted % 3 === 0;
+    const ranges = !whole ? null : CURVES.map((_, i) => {
       const values = panes.flatMap(({ history }) => history.map((h) => h.values[i])).filter((v) => v > 0);
       const limit = scaled(i, stage.limits[i]) || 0;
       const high = values.reduce((a, b) => Math.max(a, b), Math.max(limit, 1e-12));
@@ -113,7 +115,8 @@
       const pane = panes[k];
       drawing.scene(pane.picture, stage, state.frames[k], all, view);
       if (ball && ball.pane === k) aim(pane.picture);
-      strips(pane, state, ranges, most);
+      if (whole) strips(pane, state, ranges, most);
+      pane.lanes.textContent = ` · ${own.lanes} lane${own.lanes > 1 ? "s" : ""}`;
       pane.verdict.textContent = own.verdict + (own.since > 0 ? ` (since step ${own.since})` : "") + (own.pushes ? ` · ${own.pushes} pushes` : "");
       pane.verdict.className = own.good ? "verdict good" : "verdict";
     });
@@ -138,7 +141,7 @@
     const box = (i) => ({ left, right, top: i * row + 17, bottom: (i + 1) * row - 3 });
     CURVES.forEach(([name, unit], i) => {
       const limit = scaled(i, stage.limits[i]), [low, high] = ranges[i];
-      const shown = (v) => (unit === "%" ? `${v < 0.01 ? v.toExponential(0).replace("-", "−") : v.toPrecision(2)} %` : si(v, unit));
+      const shown = (v) => (unit === "%" ? `${v < 0.001 ? v.toExponential(0).replace("-", "−") : v.toPrecision(2)} %` : si(v, unit));
       const text = shown(last.values[i]) + (limit ? `, limit ${shown(limit)}` : "");
       const line = history.map((p) => [across(p.step), p.values[i]]);
       drawing.strip(c, box(i), { name, text, color, low, high, line, mark: null, limit });
@@ -216,7 +219,7 @@
     made.color = own.color;
     made.figure.style.setProperty("--own", own.color);
     made.figure.classList.toggle("ink", own.color === "#222222");
-    made.caption.replaceChildren(element("b", { textContent: own.solver }), ` · ${own.setting} · ${own.lanes} lanes`);
+    made.caption.replaceChildren(element("b", { textContent: own.solver }), ` · ${own.setting}`, made.lanes = element("span"));
     // While a slider is dragged, it stays.
     if (made.knobs.contains(document.activeElement) && made.knobs.childElementCount) return;
     const k = stage.panes.indexOf(own);
@@ -282,7 +285,7 @@
   }
 
   function asks() {
-    send({ do: "show", points: view.depths || view.forces || view.colors, islands: view.islands });
+    send({ do: "show", depths: view.depths, points: view.forces || view.colors, islands: view.islands });
     draw(page.state);
   }
 

@@ -3,18 +3,18 @@
 //
 // A run is `{ header fields, frames }` with the header of src/lab/recording/mod.rs. A frame is
 // `{ poses, points, values }`: poses hold x, y (m) and angle (rad) of every body in turn; a point is
-// `{ a, b, x, y, separation, ix, iy }` with the impulse on body b. A frame may have `islands`, a number for each body,
-// and its points a `color`, a number.
+// `{ a, b, x, y, separation, ix, iy }` with the impulse on body b. A frame may have `depths`, the deepest overlap (m) of
+// each body, and `islands`, a number for each; points may have a `color`, a number.
 //
 // Paths are long and few: what has the same colors is filled and stroked together.
 const drawing = (() => {
   const LIGHT = {
     ramp: [[243, 245, 248], [253, 228, 160], [245, 155, 75], [204, 61, 51], [107, 16, 48]],
-    paper: "#fff", ink: "#1f2933", edge: "#52606d", fixed: "#d3d8de", moved: "#d9d2e9", body: "#e3ebf5", grid: "#e4e7eb", force: "#0072b2", bad: "#fbe9e3",
+    paper: "#fff", ink: "#1f2933", edge: "#52606d", fixed: "#d3d8de", moved: "#d9d2e9", body: "#e3ebf5", small: "#b8c4d2", grid: "#e4e7eb", force: "#0072b2", bad: "#fbe9e3",
   };
   const DARK = {
     ramp: [[38, 49, 61], [110, 52, 48], [204, 81, 51], [245, 165, 75], [255, 240, 180]],
-    paper: "#14181d", ink: "#e4e7eb", edge: "#9aa5b1", fixed: "#3e4c59", moved: "#3d3557", body: "#26313d", grid: "#323f4b", force: "#7cc4f5", bad: "#3b2420",
+    paper: "#14181d", ink: "#e4e7eb", edge: "#9aa5b1", fixed: "#3e4c59", moved: "#3d3557", body: "#26313d", small: "#52606d", grid: "#323f4b", force: "#7cc4f5", bad: "#3b2420",
   };
   const isDark = matchMedia("(prefers-color-scheme: dark)");
   const theme = () => (isDark.matches ? DARK : LIGHT);
@@ -142,47 +142,54 @@ const drawing = (() => {
     c.stroke();
   }
 
-  // Number of shapes in a path: longer ones take longer than two of half their length.
-  const TOGETHER = 128;
+  // Number of shapes in a path. The time of a path grows faster than its length.
+  const TOGETHER = 16;
+  // Bodies are small below this size (pixels) if there are more than these, and have gaps of this width (pixels).
+  const SMALL = 9, MANY = 2000, GAP = 0.9;
   // Shades of a depth.
   const SHADES = 32;
 
-  function shapes(c, { shapes: all, kinds }, { poses, points, islands }, { size, thickness, deepest }, view, place) {
-    const { edge, fixed, moved, body: plain } = theme();
+  function shapes(c, { shapes: all, kinds }, { poses, points, depths, islands }, { size, thickness, deepest }, view, place) {
+    const { edge, fixed, moved, body: plain, small: empty } = theme();
     const { scale } = place;
-    const depth = new Float64Array(kinds.length);
-    for (const p of points) for (const i of [p.a, p.b]) depth[i] = Math.max(depth[i], -p.separation);
+    const depth = depths || new Float64Array(kinds.length);
+    if (!depths) for (const p of points) for (const i of [p.a, p.b]) depth[i] = Math.max(depth[i], -p.separation);
     c.lineJoin = "round";
     c.lineWidth = clamp(0.03 * size * scale, 0.5, 1.2);
     const shown = view.depths && deepest > 0, thin = thickness * scale < 3;
-    const shade = (low, share) => ramp(low + (1 - low) * Math.round(SHADES * Math.min(share, 1)) / SHADES);
+    const tones = (low) => Array.from({ length: SHADES + 1 }, (_, i) => ramp(low + (1 - low) * i / SHADES));
+    const [insides, borders] = [tones(0), tones(0.3)];
+    // Borders of many small bodies take as long as their insides: gaps take their place.
+    const small = !thin && size * scale < SMALL && all.length > MANY, shrink = small ? 1 - GAP / (size * scale) : 1;
     const batches = new Map();
+    // Cosine and sine of each angle, in pixels per meter.
     const turns = new Float64Array(2 * kinds.length);
     for (let i = 0; i < kinds.length; i++) {
-      turns[2 * i] = scale * Math.cos(poses[3 * i + 2]);
-      turns[2 * i + 1] = scale * Math.sin(poses[3 * i + 2]);
+      const own = kinds[i] === "d" ? scale * shrink : scale;
+      turns[2 * i] = own * Math.cos(poses[3 * i + 2]);
+      turns[2 * i + 1] = own * Math.sin(poses[3 * i + 2]);
     }
     for (const shape of all) {
       const { body } = shape, kind = kinds[body];
       if (kind !== "s" && !isSeen(shape, poses, place)) continue;
-      const share = depth[body] / deepest;
+      const tone = shown ? Math.round(SHADES * Math.min(Math.max(depth[body], 0) / deepest, 1)) : 0;
       // What is too thin for an inside shows its color on its border.
-      const border = kind === "d" && shown && thin && depth[body] > 0 ? shade(0.3, share) : edge;
+      const border = kind === "d" && shown && thin && depth[body] > 0 ? borders[tone] : edge;
       const inside = kind === "s" ? fixed : kind === "k" ? moved
-        : view.islands && islands ? hue(islands[body]) : shown ? shade(0, share) : plain;
+        : view.islands && islands ? hue(islands[body]) : shown && (tone || !small) ? insides[tone] : small ? empty : plain;
       const key = inside + border;
       let batch = batches.get(key);
-      if (!batch) batches.set(key, batch = { inside, border, list: [] });
+      if (!batch) batches.set(key, batch = { inside, border: small && kind === "d" ? null : border, list: [] });
       batch.list.push(shape);
     }
     for (const { inside, border, list } of batches.values()) {
       c.fillStyle = inside;
-      c.strokeStyle = border;
+      if (border) c.strokeStyle = border;
       for (let i = 0; i < list.length; i += TOGETHER) {
         c.beginPath();
         for (let k = i; k < Math.min(i + TOGETHER, list.length); k++) outline(c, list[k], poses, turns, place);
         c.fill();
-        c.stroke();
+        if (border) c.stroke();
       }
     }
   }
@@ -197,7 +204,7 @@ const drawing = (() => {
   // Adds a closed outline to the path: that of the vertices, with an arc around each if there is a radius.
   function outline(c, { body, points, radius }, poses, turns, { scale, left, top }) {
     const ox = left + scale * poses[3 * body], oy = top - scale * poses[3 * body + 1];
-    const cos = turns[2 * body], sin = turns[2 * body + 1], r = radius * scale, n = points.length;
+    const cos = turns[2 * body], sin = turns[2 * body + 1], r = radius * Math.hypot(cos, sin), n = points.length;
     const x = (p) => ox + cos * p[0] - sin * p[1], y = (p) => oy - sin * p[0] - cos * p[1];
     if (n === 1) {
       const cx = x(points[0]), cy = y(points[0]);

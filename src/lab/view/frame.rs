@@ -11,8 +11,9 @@
 //!
 //! | bytes | what |
 //! |---|---|
-//! | 3 × `u32` | numbers of bodies, points and islands' entries |
+//! | 4 × `u32` | numbers of bodies, depths, points and islands' entries |
 //! | `f32` × 3 × bodies | x, y relative to the stage's origin (m), angle (rad) |
+//! | `f32` × bodies, or nothing | deepest overlap (m) of the body in the last step |
 //! | `f32` × 8 × points | bodies a, b, x, y, separation (m), impulse on b (N·s) × 2, color (−1: none) |
 //! | `u32` × bodies, or nothing | island: the least body of it, or the body itself if it is alone or not dynamic |
 
@@ -53,7 +54,8 @@ impl Session {
         let relative = |i: usize| (DVec2::from(bodies.center(i)) - origin).as_vec2();
         let points = if self.shown.points { world.counts.points } else { 0 };
         let islands = if self.shown.islands { islands(world) } else { Vec::new() };
-        for number in [bodies.len(), points, islands.len()] {
+        let depths = if self.shown.depths { depths(world) } else { Vec::new() };
+        for number in [bodies.len(), depths.len(), points, islands.len()] {
             bytes.extend((number as u32).to_le_bytes());
         }
         let mut numbers = |list: &[f32]| list.iter().for_each(|x| bytes.extend(x.to_le_bytes()));
@@ -61,6 +63,7 @@ impl Session {
             let at = relative(i);
             numbers(&[at.x, at.y, bodies.angle(i)]);
         }
+        numbers(&depths);
         if points > 0 {
             let colors = world.contact_colors();
             for (contact, color) in world.contacts.iter().zip(colors) {
@@ -85,6 +88,7 @@ fn status(pane: &Pane) -> Value {
         "last": pane.last(),
         "phase_ns": timings.phase_ns,
         "step_ns": timings.step_ns,
+        "lanes": pane.world.lane_width().lanes(),
         "contacts": counts.contacts,
         "points": counts.points,
         "colors": counts.colors,
@@ -94,6 +98,18 @@ fn status(pane: &Pane) -> Value {
         "since": pane.since,
         "failed": pane.failure.is_some(),
     })
+}
+
+/// The deepest overlap of each body (m), at the start of the last step; 0 without one.
+fn depths(world: &World) -> Vec<f32> {
+    let mut depths = vec![0.0_f32; world.bodies.len()];
+    for contact in &world.contacts {
+        let deepest = contact.manifold.points().iter().map(|point| -point.separation).fold(0.0, f32::max);
+        for body in [contact.body_a, contact.body_b] {
+            depths[body as usize] = depths[body as usize].max(deepest);
+        }
+    }
+    depths
 }
 
 /// The island of each body: dynamic bodies that are connected by contacts and joints, named by the least of them.

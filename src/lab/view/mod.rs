@@ -42,12 +42,15 @@ pub use scene::Source;
 /// Largest number of panes.
 pub const MOST_PANES: usize = page::MOST;
 
-/// Bodies whose errors are measured in every step; a larger scene is measured in every k-th.
+/// Largest number of bodies, in all panes together, whose errors are measured in every step; of more, the errors of
+/// [`AT_A_TIME`] bodies per step are measured on average.
 const MEASURED_BODIES: usize = 1500;
+const AT_A_TIME: usize = 500;
 
 /// Overlays whose data are sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Shown {
+    depths: bool,
     points: bool,
     islands: bool,
 }
@@ -80,7 +83,7 @@ impl Session {
         }
         let panes = open(&source, settings, poke)?;
         let stage = Stage::of(&panes[0].world);
-        let shown = Shown { points: true, islands: false };
+        let shown = Shown { depths: true, points: true, islands: false };
         Ok(Session {
             source,
             panes,
@@ -123,7 +126,10 @@ impl Session {
 
     /// Errors are measured every this many steps.
     fn measured_every(&self) -> u64 {
-        (self.stage.kinds.len() * self.panes.len()).div_ceil(MEASURED_BODIES).max(1) as u64
+        match self.stage.kinds.len() * self.panes.len() {
+            few if few <= MEASURED_BODIES => 1,
+            many => many.div_ceil(AT_A_TIME) as u64,
+        }
     }
 
     /// Steps all panes; one that diverged stays as it is. Errors: the recording has become too large.
@@ -135,7 +141,8 @@ impl Session {
                 pane.pull(grab, self.stage.origin)?;
             }
             // Not all panes in the same step, so that the longest step is shorter.
-            pane.step((every > 1).then(|| (self.step + k as u64).is_multiple_of(every)))?;
+            let turn = self.step + k as u64 * every / MOST_PANES as u64;
+            pane.step((every > 1).then(|| turn.is_multiple_of(every)))?;
         }
         for (recorder, pane) in self.recorders.iter_mut().zip(&self.panes) {
             if pane.failure.is_none() {
@@ -155,8 +162,8 @@ impl Session {
                 self.poke = *seed;
                 self.panes.iter_mut().for_each(|pane| pane.poke(*seed));
             }
-            Request::Show { points, islands } => {
-                self.shown = Shown { points: *points, islands: *islands };
+            Request::Show { depths, points, islands } => {
+                self.shown = Shown { depths: *depths, points: *points, islands: *islands };
             }
             Request::Budget { pane, budget } => self.pane(*pane)?.set_budget(*budget)?,
             Request::Parameter { pane, name, value } => self.pane(*pane)?.set_parameter(name, *value)?,

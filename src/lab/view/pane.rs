@@ -147,7 +147,9 @@ impl Pane {
     pub(super) fn record(&self) -> Record {
         let Loaded { scene, truth, tolerances, .. } = &self.loaded;
         let truth = truth.as_ref().filter(|_| !self.touched).map(TruthError::of);
-        let errors = self.meter.as_ref().map_or(self.last, Observation::errors);
+        // All overlap of a single step counts: where it comes from is known only along a run.
+        let alone = || self.last.with("held_depth_p99_m", self.last.penetration_max());
+        let errors = self.meter.as_ref().map_or_else(alone, Observation::errors);
         let mut tolerances = *tolerances;
         // Nothing rests, and little is reached, before the run that the scene asks for.
         if self.world.step_index < u64::from(scene.steps) {

@@ -21,8 +21,10 @@ pub enum Request {
         /// Seed of the pushes; `None` for none.
         seed: Option<u64>,
     },
-    /// Send contact points and islands with each frame.
+    /// What to send with each frame.
     Show {
+        /// Whether the deepest overlap of each body is sent.
+        depths: bool,
         /// Whether contact points are sent.
         points: bool,
         /// Whether islands are sent.

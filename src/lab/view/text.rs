@@ -3,7 +3,7 @@
 use super::pane::Pane;
 use super::request::What;
 use super::scene::{FRICTION, GRAVITY, Source};
-use super::{MEASURED_BODIES, Session};
+use super::Session;
 use crate::engine::bodies::BodyKind;
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Impacts;
@@ -67,7 +67,6 @@ impl Session {
             "steps": scene.steps,
             "bodies": self.stage.kinds.iter().filter(|kind| **kind == BodyKind::Dynamic).count(),
             "measured_every": self.measured_every(),
-            "measured_bodies": MEASURED_BODIES,
             "size": size.map(|s| json!({ "min": s.min, "max": s.max, "value": now.unwrap_or(s.default), "meaning": s.meaning })),
             "poke": self.poke,
             "seed": seeded.then_some(self.source.seed.unwrap_or(0)),
@@ -98,7 +97,6 @@ fn setting(pane: &Pane) -> Value {
         "solver": solver.name,
         "color": Style::of(solver.name).color.to_string(),
         "setting": record.budget_text,
-        "lanes": record.lanes,
         "budget": settings.budget,
         "sweeps": budget::kinds(&settings.budget, solver).map(|(kind, _)| kind).collect::<Vec<_>>(),
         "parameters": parameters.collect::<Vec<_>>(),
