@@ -6,6 +6,8 @@ mod browser;
 mod documents;
 mod replay;
 mod report;
+mod socket;
+mod view;
 
 use simpulse::engine::solvers::VARIANTS;
 use simpulse::lab::report::study_file::StudyFile;

@@ -156,7 +156,7 @@ impl Guard {
 /// Reads a request up to the empty line.
 fn read_head(stream: &mut TcpStream) -> Result<Head, Refusal> {
     let bad = |_| (400, "the request is damaged");
-    let (mut bytes, mut part) = (Vec::new(), [0; 1024]);
+    let (mut bytes, mut part) = (Vec::new(), [0; 2 * LARGEST_HEAD]);
     loop {
         let count = match stream.read(&mut part) {
             Ok(0) => return Err((400, "the request is cut off")),
@@ -165,6 +165,9 @@ fn read_head(stream: &mut TcpStream) -> Result<Head, Refusal> {
             Err(_) => return Err((408, "the request is too slow")),
         };
         bytes.extend(&part[..count]);
+        if bytes.len() > LARGEST_HEAD {
+            return Err((431, "the request is too long"));
+        }
         let mut headers = [httparse::EMPTY_HEADER; MOST_HEADERS];
         let mut request = httparse::Request::new(&mut headers);
         if request.parse(&bytes).map_err(bad)?.is_complete() {
@@ -184,9 +187,6 @@ fn read_head(stream: &mut TcpStream) -> Result<Head, Refusal> {
                 origin: of("origin"),
                 key: of("sec-websocket-key").filter(|_| upgrades),
             });
-        }
-        if bytes.len() > LARGEST_HEAD {
-            return Err((431, "the request is too long"));
         }
     }
 }
