@@ -19,6 +19,7 @@ pub mod run;
 mod sheets;
 pub mod study;
 pub mod times;
+mod trace;
 pub mod values;
 pub mod verify;
 pub mod view;

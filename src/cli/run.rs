@@ -6,11 +6,12 @@ use super::progress::Bar;
 use super::record::{self, RecordArgs};
 use super::sheets::Sheets;
 use super::times::Times;
+use super::trace;
 use super::values::{self, SettingArgs, scene_help};
 use crate::engine::lanes::LaneWidth;
 use crate::engine::world::{Order, Settings, World};
 use crate::lab::error::Error;
-use crate::lab::files::same_file;
+use crate::lab::files::{Pending, same_file};
 use crate::lab::memory;
 use crate::lab::metrics::Errors;
 use crate::lab::overrides;
@@ -24,6 +25,7 @@ use crate::lab::study::{FailedAt, TruthError, budget, open_scene};
 use crate::lab::trial::{Trial, TrialOutcome};
 use clap::Args;
 use serde_json::{Value, json};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -40,6 +42,7 @@ Examples:
   simpulse run my.json --steps 600 --state out.csv --contacts contacts.csv --every 60
   simpulse run crane --joints joints.csv --every 1
   simpulse run pyramid:20 --picture pyramid.svg --step 120
+  simpulse run smash --trace smash.json                    which step is the longest, and why? (ui.perfetto.dev)
   simpulse run stack:20 --steps 1200 --poke 1              does it survive a player?
   simpulse run stack:12 --solvers pgs,soft_step --record replay.html --record-contacts")]
 pub struct RunArgs {
@@ -74,6 +77,9 @@ pub struct RunArgs {
     /// Write a CSV of joints with their gaps, angles, impulses by row (N·s over the step) and loads
     #[arg(long, value_name = "FILE.csv")]
     pub joints: Option<PathBuf>,
+    /// Write the phases of every step as a Chrome trace (JSON), for Perfetto and similar viewers
+    #[arg(long, value_name = "FILE.json", conflicts_with_all = ["picture", "record"])]
+    pub trace: Option<PathBuf>,
     /// Picture of a frame
     #[command(flatten)]
     pub picture: PictureArgs,
@@ -148,10 +154,15 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         return record::run(args, path);
     }
     let settings = settings(args, args.setting.settings()?)?;
-    let files = [("--state", &args.state), ("--contacts", &args.contacts), ("--joints", &args.joints)];
+    let files = [
+        ("--state", &args.state),
+        ("--contacts", &args.contacts),
+        ("--joints", &args.joints),
+        ("--trace", &args.trace),
+    ];
     let files: Vec<(&str, &Path)> =
         files.into_iter().filter_map(|(name, file)| Some((name, file.as_deref()?))).collect();
-    if args.every.is_some() && files.is_empty() {
+    if args.every.is_some() && !files.iter().any(|(name, _)| *name != "--trace") {
         return Err(Error::invalid("every", "needs --state, --contacts, --joints or --record"));
     }
     for (i, (name, file)) in files.iter().enumerate() {
@@ -166,6 +177,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let scene = &*scene;
     memory::check("run", scene.bodies.len(), 0, 1)?;
     let mut sheets = Sheets::new(args)?;
+    // Opened now, so that a file that cannot be written is reported before the run.
+    let trace = args.trace.as_deref().map(|path| Pending::new(path).map(|file| (file, path))).transpose()?;
     let bar = Bar::new();
     let trial = Trial {
         demands: demands.clone(),
@@ -204,7 +217,13 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let TrialOutcome { world, errors, truth, broken, .. } = found;
     let errors = errors.ok_or_else(|| Error::invalid("run", "no step was measured"))?;
     let found = RunResult { times, errors, truth, broken, poked, unchecked: unchecked.clone(), rests };
-    let written = sheets.commit()?;
+    let mut written = sheets.commit()?;
+    if let Some((mut file, path)) = trace {
+        let text = trace::text(&scene.name, world.settings.solver.name, &found.times)?;
+        file.write_all(text.as_bytes()).map_err(Error::io(path))?;
+        file.commit()?;
+        written += &format!("wrote {}\n", path.display());
+    }
     if args.json {
         return print_json(&json(&world, scene, &found)?);
     }

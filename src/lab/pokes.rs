@@ -75,7 +75,9 @@ impl Pokes {
         let arm = reach * self.random.random_range(0.0..OFF_CENTER);
         self.given += 1;
         self.pause();
-        let Some(handle) = world.handle(body).filter(|_| world.bodies.is_dynamic(body)) else { return Ok(()) };
+        let Some(handle) = world.handle(body).filter(|_| world.bodies.is_dynamic(body)) else {
+            return Ok(());
+        };
         let impulse = speed / f64::from(world.bodies.inv_mass[body]);
         let [x, y] = world.bodies.center(body);
         let point = [x + arm * offset.1, y + arm * offset.0];

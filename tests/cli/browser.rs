@@ -101,7 +101,8 @@ pub fn visit(address: &str, script: &str) -> Option<Value> {
         .spawn()
         .unwrap();
     let lines = BufReader::new(child.stderr.take().unwrap()).lines();
-    let own = lines.map_while(Result::ok).find_map(|line| Some(line.split_once("ws://")?.1.to_string())).unwrap();
+    let own =
+        lines.map_while(Result::ok).find_map(|line| Some(line.split_once("ws://")?.1.to_string())).unwrap();
     let (host, path) = own.split_once('/').unwrap();
     let mut tools = socket::connect(host, &format!("/{path}"), None).unwrap();
     let (mut number, mut faults) = (0, Vec::new());

@@ -212,7 +212,8 @@ fn play_step_reset_and_limits() {
     page.frame_where(|seen| seen.step == 21);
     page.send(json!({ "do": "reset" }));
     page.frame_where(|seen| seen.step == 0);
-    let bad = json!({ "substeps": 0, "velocity_iterations": 1, "relax_iterations": 1, "position_iterations": 0 });
+    let bad =
+        json!({ "substeps": 0, "velocity_iterations": 1, "relax_iterations": 1, "position_iterations": 0 });
     page.send(json!({ "do": "budget", "pane": 0, "budget": bad }));
     page.frame_where(|seen| seen.status["said"].as_str().unwrap().contains("substeps"));
     page.send(json!({ "do": "scene", "size": 5 }));
@@ -242,6 +243,16 @@ fn it_ends_when_the_page_is_closed_for_its_patience_and_a_newer_page_takes_over(
     assert_eq!(program.ends().code(), Some(0));
     // Never opened.
     assert_eq!(Program::start("stack:2 --patience 1").ends().code(), Some(0));
+}
+
+#[test]
+#[cfg(unix)]
+fn a_signal_ends_it() {
+    let mut program = Program::start("stack:2 --patience 30");
+    program.open().frame(true);
+    let pid = program.child.id().to_string();
+    assert!(std::process::Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+    assert_eq!(program.ends().code(), Some(130));
 }
 
 #[test]
@@ -324,6 +335,9 @@ fn a_player_in_a_real_browser() {
         let far: f64 = (0..2).map(|k| (number(&end[k]) - number(&found["goal"][k])).abs()).sum();
         assert!(far < 0.6, "{found}");
     }
-    assert!(number(&found["ground"]) > 1000.0 && found["verdict"].as_str().unwrap().contains("good"), "{found}");
+    assert!(
+        number(&found["ground"]) > 1000.0 && found["verdict"].as_str().unwrap().contains("good"),
+        "{found}"
+    );
     assert!(found["text"].as_str().unwrap().starts_with('{'), "{found}");
 }

@@ -119,7 +119,8 @@ fn what_is_cut_comes_apart_in_all_panes() {
     assert_eq!(joints(&session), 2);
     act(&mut session, r#"{"do":"cut","pane":1,"at":[0.0,0.0],"reach":0.1}"#);
     assert!(joints(&session) == 0 && session.version() > version);
-    let height = |session: &Session| session.panes().iter().map(|p| p.world.bodies.center(1)[1]).collect::<Vec<_>>();
+    let height =
+        |session: &Session| session.panes().iter().map(|p| p.world.bodies.center(1)[1]).collect::<Vec<_>>();
     let high = height(&session);
     steps(&mut session, 60);
     // In a second it falls by g/2, and by up to g Δt/2 more because time is in steps.
@@ -135,7 +136,9 @@ fn settings_and_scenes_change_and_bad_values_change_nothing() {
     act(&mut session, r#"{"do":"treatment","pane":0,"frozen":"off","impacts":"waves"}"#);
     act(&mut session, r#"{"do":"scene","size":6,"friction":0.5}"#);
     act(&mut session, r#"{"do":"scene","gravity":5}"#);
-    let settings = |session: &Session| session.panes().iter().map(|p| format!("{:?}", p.world.settings)).collect::<String>();
+    let settings = |session: &Session| {
+        session.panes().iter().map(|p| format!("{:?}", p.world.settings)).collect::<String>()
+    };
     let own = &session.panes()[1].world;
     assert_eq!((own.settings.budget.substeps, own.bodies.len(), own.settings.gravity), (7, 7, [0.0, -5.0]));
     steps(&mut session, 10);
@@ -163,7 +166,10 @@ fn texts_run_the_same_elsewhere() {
     act(&mut session, r#"{"do":"parameter","pane":0,"name":"contact_hertz","value":45}"#);
     steps(&mut session, 3);
     let command = act(&mut session, r#"{"do":"text","what":"command","pane":0}"#).unwrap();
-    assert!(command.contains("stack:4 --solver soft_step") && command.contains("contact_hertz=45"), "{command}");
+    assert!(
+        command.contains("stack:4 --solver soft_step") && command.contains("contact_hertz=45"),
+        "{command}"
+    );
     Cli::try_parse_from(command.split_whitespace()).unwrap();
     let rust = act(&mut session, r#"{"do":"text","what":"rust","pane":0}"#).unwrap();
     for part in ["find(\"soft_step\")?", "substeps: 4", "\"contact_hertz\", 45.0)?", "World::new(settings)"] {

@@ -76,17 +76,16 @@ const TOO_LATE: Duration = Duration::from_millis(100);
 pub fn run(args: &ViewArgs) -> Result<ExitCode, Error> {
     let settings = match args.solvers.is_empty() {
         true => vec![args.setting.settings()?],
-        false => args.solvers.iter().map(|pane| pane.settings(&args.setting)).collect::<Result<_, Error>>()?,
+        false => {
+            args.solvers.iter().map(|pane| pane.settings(&args.setting)).collect::<Result<_, Error>>()?
+        }
     };
     let source = Source { seed: args.seed, dt: args.dt, ..Source::named(&args.scene) };
     let session = Session::new(source, settings, args.poke)?;
     let (sender, events) = channel();
     let hub = Hub::new(sender);
     let door = Door::open(args.port, hub.clone())?;
-    note(&format!(
-        "{}\nOpen this address in a browser on this machine; Ctrl-C ends.\n",
-        door.address()
-    ));
+    note(&format!("{}\nOpen this address in a browser on this machine; Ctrl-C ends.\n", door.address()));
     door.listen();
     Show { session, hub, play: Playback::default(), until: args.steps, said: String::new() }
         .run(&events, Duration::from_secs(args.patience.into()))

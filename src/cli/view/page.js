@@ -21,7 +21,7 @@
   ];
   const CURVES = [["overlap", "m"], ["force error (% of a body's weight)", "%"], ["speed", "m/s"]];
 
-  let stage = null, all = null, panes = [], newest = null, waiting = 0, drawn = [];
+  let stage = null, all = null, start = null, panes = [], newest = null, waiting = 0, drawn = [];
   let playing = true, speed = 1, asked = null, impulses = [], counted = 0;
 
   const socket = new WebSocket(`ws://${location.host}${location.pathname}socket`);
@@ -99,7 +99,9 @@
       const limit = stage.limits[0];
       all = { ...drawing.measures([{ ...stage, frames: [state.frames[0]] }]), deepest: limit };
       page.all = all;
+      start = [...all.box];
     }
+    if (view.zoom === 1 && view.x === 0 && view.y === 0 && (!playing || counted % 10 === 0)) follow(state.frames);
     all.carried = [...impulses].sort((a, b) => a - b)[impulses.length >> 1] || 1;
     // The eye follows bodies, not curves: every third frame has them.
     const whole = !playing || ++counted % 3 === 0;
@@ -129,6 +131,21 @@
     get("clock").textContent = `step ${state.step} · ${(state.step * stage.dt).toFixed(2)} s${rate}`;
   }
 
+  // Grows the picture with what moves out of it, except for a tenth of the bodies: what flies off does.
+  const FARTHEST = 5;
+  function follow(frames) {
+    const { box, size } = all, far = FARTHEST * Math.max(start[2] - start[0], start[3] - start[1], size);
+    const moving = [...stage.kinds].flatMap((kind, i) => (kind === "d" ? [i] : [])), spared = Math.floor(moving.length / 10);
+    for (const { poses } of frames) {
+      for (const k of [0, 1]) {
+        const sorted = Float32Array.from(moving, (i) => poses[3 * i + k]).sort();
+        if (!sorted.length) return;
+        box[k] = Math.min(box[k], Math.max(sorted[spared] - size, start[k] - far));
+        box[k + 2] = Math.max(box[k + 2], Math.min(sorted[sorted.length - 1 - spared] + size, start[k + 2] + far));
+      }
+    }
+  }
+
   const scaled = (i, limit) => (i === 1 && limit !== null ? 100 * limit : limit);
 
   function strips({ strips: canvas, history, color }, { step }, ranges, most) {
@@ -141,7 +158,7 @@
     const box = (i) => ({ left, right, top: i * row + 17, bottom: (i + 1) * row - 3 });
     CURVES.forEach(([name, unit], i) => {
       const limit = scaled(i, stage.limits[i]), [low, high] = ranges[i];
-      const shown = (v) => (unit === "%" ? `${v < 0.001 ? v.toExponential(0).replace("-", "−") : v.toPrecision(2)} %` : si(v, unit));
+      const shown = (v) => (unit === "%" ? `${v < 0.001 ? v.toExponential(0).replace("-", "−") : Number(v.toPrecision(2))} %` : si(v, unit));
       const text = shown(last.values[i]) + (limit ? `, limit ${shown(limit)}` : "");
       const line = history.map((p) => [across(p.step), p.values[i]]);
       drawing.strip(c, box(i), { name, text, color, low, high, line, mark: null, limit });
@@ -158,15 +175,17 @@
       c.fill();
     }
     const recent = history.slice(-60), mean = (of) => recent.reduce((total, p) => total + of(p), 0) / recent.length;
-    drawing.label(c, box(CURVES.length), "", `${si(1e-9 * mean((p) => p.ns), "s")} a step, with measurement on`);
+    const wide = w > 560, time = si(1e-9 * mean((p) => p.ns), "s");
+    drawing.label(c, box(CURVES.length), "", wide ? `${time} a step, with measurement on` : `${time} a step`);
     let x = left;
     GROUPS.forEach(([name, tone], g) => {
-      const text = `${name} ${Math.round(100 * mean((p) => p.groups[g]) / Math.max(mean((p) => p.ns), 1))} %`;
+      const share = Math.round(100 * mean((p) => p.groups[g]) / Math.max(mean((p) => p.ns), 1));
+      const text = wide ? `${name} ${share} %` : name;
       c.fillStyle = tone;
       c.fillRect(x, top - 12, 8, 8);
       c.fillStyle = theme().ink;
-      if (w > 420) c.fillText(text, x + 11, top - 4);
-      x += w > 420 ? 19 + c.measureText(text).width : 12;
+      c.fillText(text, x + 11, top - 4);
+      x += 19 + c.measureText(text).width;
     });
   }
 
@@ -181,6 +200,7 @@
       view.forces = stage.bodies <= 1000;
       get("panes").replaceChildren();
       panes = told.panes.map((own, k) => pane(k));
+      get("panes").className = `of${panes.length}`;
       shows();
       document.title = `${stage.scene} – simpulse view`;
     } else if (others) {
@@ -386,7 +406,7 @@
   get("forth").onclick = () => send({ do: "step" });
   get("reset").onclick = () => send({ do: "reset" });
   get("speed").onchange = () => play(playing);
-  get("fit").onclick = () => { Object.assign(view, { zoom: 1, x: 0, y: 0 }); draw(page.state); };
+  get("fit").onclick = () => { all = null; Object.assign(view, { zoom: 1, x: 0, y: 0 }); draw(page.state); };
   get("record").onclick = () => send({ do: "record", on: get("record").className !== "on" });
   const poke = () => send({ do: "poke", seed: get("poke").checked ? Math.max(0, Math.round(get("pokeseed").value)) : null });
   get("poke").onchange = poke;

@@ -171,7 +171,8 @@ fn read_head(stream: &mut TcpStream) -> Result<Head, Refusal> {
         let mut headers = [httparse::EMPTY_HEADER; MOST_HEADERS];
         let mut request = httparse::Request::new(&mut headers);
         if request.parse(&bytes).map_err(bad)?.is_complete() {
-            let all = |name: &str| request.headers.iter().filter(|h| h.name.eq_ignore_ascii_case(name)).count();
+            let all =
+                |name: &str| request.headers.iter().filter(|h| h.name.eq_ignore_ascii_case(name)).count();
             let of = |name: &str| {
                 let header = request.headers.iter().find(|h| h.name.eq_ignore_ascii_case(name))?;
                 Some(String::from_utf8_lossy(header.value).into_owned())

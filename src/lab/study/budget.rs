@@ -151,7 +151,12 @@ pub fn with_treatments(text: String, impacts: Impacts, frozen: Freezing) -> Stri
 }
 
 /// The whole setting: [`brief`], the treatments, and the parameters that differ from the solver's defaults.
-pub fn whole(budget: &Budget, variant: &Variant, treatments: (Impacts, Freezing), own: &Parameters) -> String {
+pub fn whole(
+    budget: &Budget,
+    variant: &Variant,
+    treatments: (Impacts, Freezing),
+    own: &Parameters,
+) -> String {
     let text = with_treatments(brief(budget, variant), treatments.0, treatments.1);
     let parameters = overrides::brief(variant, own);
     if parameters.is_empty() { text } else { format!("{text} {parameters}") }

@@ -19,6 +19,7 @@
 
 use super::Session;
 use super::pane::Pane;
+use crate::engine::disjoint::DisjointSets;
 use crate::engine::world::World;
 use glam::DVec2;
 use serde_json::{Value, json};
@@ -114,21 +115,14 @@ fn depths(world: &World) -> Vec<f32> {
 
 /// The island of each body: dynamic bodies that are connected by contacts and joints, named by the least of them.
 fn islands(world: &World) -> Vec<u32> {
-    let mut parent: Vec<u32> = (0..world.bodies.len() as u32).collect();
-    fn root(parent: &mut [u32], mut i: u32) -> u32 {
-        while parent[i as usize] != i {
-            parent[i as usize] = parent[parent[i as usize] as usize];
-            i = parent[i as usize];
-        }
-        i
-    }
+    let mut sets = DisjointSets::default();
+    sets.begin(world.bodies.len());
     let touching = world.contacts.iter().map(|c| [c.body_a, c.body_b]);
     let joined = world.joints().map(|(_, joint)| [joint.a.index() as u32, joint.b.index() as u32]);
     for [a, b] in touching.chain(joined) {
         if [a, b].iter().all(|&i| world.bodies.is_dynamic(i as usize)) {
-            let [a, b] = [a, b].map(|i| root(&mut parent, i));
-            parent[a.max(b) as usize] = a.min(b);
+            sets.join(a, b);
         }
     }
-    (0..parent.len() as u32).map(|i| root(&mut parent, i)).collect()
+    (0..world.bodies.len() as u32).map(|i| sets.least(i)).collect()
 }

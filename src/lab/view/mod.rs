@@ -79,7 +79,10 @@ impl Session {
     /// Errors: no settings or too many; a scene that cannot be read or built; a solver that cannot run it.
     pub fn new(source: Source, settings: Vec<Settings>, poke: Option<u64>) -> Result<Self, Error> {
         if !(1..=MOST_PANES).contains(&settings.len()) {
-            return Err(Error::invalid("--solvers", format!("{} panes, 1 to {MOST_PANES} fit", settings.len())));
+            return Err(Error::invalid(
+                "--solvers",
+                format!("{} panes, 1 to {MOST_PANES} fit", settings.len()),
+            ));
         }
         let panes = open(&source, settings, poke)?;
         let stage = Stage::of(&panes[0].world);

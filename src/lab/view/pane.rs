@@ -44,8 +44,17 @@ impl Pane {
         let monitor = SceneMonitor::new(&world, loaded.demands.clone());
         let meter = Some(Observation::new(&world));
         let last = Errors::default();
-        let mut pane =
-            Pane { world, failure: None, loaded, monitor, meter, last, since: 0, pokes: None, touched: false };
+        let mut pane = Pane {
+            world,
+            failure: None,
+            loaded,
+            monitor,
+            meter,
+            last,
+            since: 0,
+            pokes: None,
+            touched: false,
+        };
         pane.poke(poke);
         Ok(pane)
     }
@@ -140,7 +149,11 @@ impl Pane {
     /// Limits of [`Self::last`]; `None` where the scene has none.
     pub(super) fn limits(&self) -> [Option<f64>; 3] {
         let tolerances = &self.loaded.tolerances;
-        [Some(tolerances.penetration.value), Some(tolerances.residual.value), tolerances.rest.map(|t| t.value)]
+        [
+            Some(tolerances.penetration.value),
+            Some(tolerances.residual.value),
+            tolerances.rest.map(|t| t.value),
+        ]
     }
 
     /// The run so far, as a study would record it.
@@ -175,7 +188,10 @@ impl Pane {
         let far = if self.world.step_index < u64::from(steps) { " so far" } else { "" };
         if let Some(why) = record.why_failed() {
             let why = why.split("; try ").next().unwrap_or_default().to_string();
-            return (false, format!("not good enough, because {}", why.replacen("diverged", "it diverged", 1)));
+            return (
+                false,
+                format!("not good enough, because {}", why.replacen("diverged", "it diverged", 1)),
+            );
         }
         let over = ErrorAxis::JUDGED.into_iter().filter_map(|axis| {
             let (error, tolerance) = (axis.of(&record)?, axis.tolerance(&record.tolerances)?.value);

@@ -137,7 +137,9 @@ impl Session {
 impl Pane {
     /// Pulls the body that is held, in the next step.
     pub(super) fn pull(&mut self, grab: &Grab, origin: [f64; 2]) -> Result<(), Error> {
-        let Some(body) = self.world.handle(grab.body).filter(|_| self.failure.is_none()) else { return Ok(()) };
+        let Some(body) = self.world.handle(grab.body).filter(|_| self.failure.is_none()) else {
+            return Ok(());
+        };
         let (b, s) = (&self.world.bodies, &self.world.settings);
         let i = body.index();
         let arm = rotation(&self.world, i).rotate(grab.point);

@@ -80,7 +80,10 @@ impl Source {
         }
         let [low, high] = FRICTION;
         if !(low..=high).contains(&self.friction) {
-            return Err(Error::invalid("friction", format!("{} is not within {low} to {high}", self.friction)));
+            return Err(Error::invalid(
+                "friction",
+                format!("{} is not within {low} to {high}", self.friction),
+            ));
         }
         let mut scene = loaded.scene;
         if let Some(gravity) = self.gravity {

@@ -1,9 +1,9 @@
 //! Texts of a session: commands, Rust, the scene file, and what the page is told about the scene.
 
+use super::Session;
 use super::pane::Pane;
 use super::request::What;
 use super::scene::{FRICTION, GRAVITY, Source};
-use super::Session;
 use crate::engine::bodies::BodyKind;
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Impacts;

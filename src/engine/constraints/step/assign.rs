@@ -155,7 +155,9 @@ impl Assignment {
         for Group { entries, coloring, .. } in &self.groups {
             for (entry, &color) in entries.iter().zip(coloring.color_of()) {
                 let place = colors.get_mut(entry.index as usize).filter(|_| entry.kind == 0);
-                place.into_iter().for_each(|place| *place = (color != OVERFLOW).then(|| first + u16::from(color)));
+                place
+                    .into_iter()
+                    .for_each(|place| *place = (color != OVERFLOW).then(|| first + u16::from(color)));
             }
             first += coloring.colors() as u16;
         }
