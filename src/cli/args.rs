@@ -8,6 +8,7 @@ use super::profile::ProfileArgs;
 use super::run::RunArgs;
 use super::study::{EXAMPLES as STUDY_EXAMPLES, StudyArgs};
 use super::verify::VerifyArgs;
+use super::view::ViewArgs;
 use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
 
@@ -17,6 +18,7 @@ Examples:
   simpulse --quick                               a look at everything, in seconds
   simpulse study --scenes stack:40,arch --solvers soft_step,pgs --lanes 1,8 --substeps 2,4,8
   simpulse run pyramid:50 --solver soft_step --lanes 16
+  simpulse view stack:20 --solvers soft_step,shim      drag bodies in a browser
   simpulse list arch --json > my.json            a scene to edit …
   simpulse run my.json --state out.csv --every 10     … and to run";
 
@@ -51,6 +53,7 @@ pub enum Command {
     Study(Box<StudyArgs>),
     Compare(CompareArgs),
     Run(RunArgs),
+    View(ViewArgs),
     Advise(AdviseArgs),
     Converge(ConvergeArgs),
     Verify(VerifyArgs),

@@ -19,8 +19,10 @@ pub mod run;
 mod sheets;
 pub mod study;
 pub mod times;
+mod trace;
 pub mod values;
 pub mod verify;
+pub mod view;
 
 use crate::engine::lanes::unused_cpu_features;
 use crate::lab::error::Error;
@@ -84,6 +86,7 @@ fn execute(cli: Cli) -> Result<ExitCode, Error> {
         Some(Command::Study(args)) => full_study(&args),
         Some(Command::Compare(args)) => compare::run(&args),
         Some(Command::Run(args)) => run::run(&args),
+        Some(Command::View(args)) => view::run(&args),
         Some(Command::Advise(args)) => advise::run(&args),
         Some(Command::Converge(args)) => converge::run(&args),
         Some(Command::Verify(args)) => verify::run(&args),

@@ -6,14 +6,16 @@ use super::progress::Bar;
 use super::record::{self, RecordArgs};
 use super::sheets::Sheets;
 use super::times::Times;
+use super::trace;
 use super::values::{self, SettingArgs, scene_help};
 use crate::engine::lanes::LaneWidth;
 use crate::engine::world::{Order, Settings, World};
 use crate::lab::error::Error;
-use crate::lab::files::same_file;
+use crate::lab::files::{Pending, same_file};
 use crate::lab::memory;
 use crate::lab::metrics::Errors;
 use crate::lab::overrides;
+use crate::lab::pokes;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::table::error_list;
 use crate::lab::report::units::{bodies, lanes, ratio, si};
@@ -23,6 +25,7 @@ use crate::lab::study::{FailedAt, TruthError, budget, open_scene};
 use crate::lab::trial::{Trial, TrialOutcome};
 use clap::Args;
 use serde_json::{Value, json};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -39,6 +42,8 @@ Examples:
   simpulse run my.json --steps 600 --state out.csv --contacts contacts.csv --every 60
   simpulse run crane --joints joints.csv --every 1
   simpulse run pyramid:20 --picture pyramid.svg --step 120
+  simpulse run smash --trace smash.json                    which step is the longest, and why? (ui.perfetto.dev)
+  simpulse run stack:20 --steps 1200 --poke 1              does it survive a player?
   simpulse run stack:12 --solvers pgs,soft_step --record replay.html --record-contacts")]
 pub struct RunArgs {
     /// Scene
@@ -72,6 +77,9 @@ pub struct RunArgs {
     /// Write a CSV of joints with their gaps, angles, impulses by row (N·s over the step) and loads
     #[arg(long, value_name = "FILE.csv")]
     pub joints: Option<PathBuf>,
+    /// Write the phases of every step as a Chrome trace (JSON), for Perfetto and similar viewers
+    #[arg(long, value_name = "FILE.json", conflicts_with_all = ["picture", "record"])]
+    pub trace: Option<PathBuf>,
     /// Picture of a frame
     #[command(flatten)]
     pub picture: PictureArgs,
@@ -84,6 +92,10 @@ pub struct RunArgs {
     /// Continuous collision: stop fast bodies at the surfaces that they would pass through [default: the solver's]
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pub continuous: Option<bool>,
+    /// Push random bodies at random times in the first half of the run, as a player would; the seed decides which and
+    /// when. The figures are those of the poked run, and bodies are compared with an unpoked one
+    #[arg(long, value_name = "SEED", conflicts_with_all = ["picture", "record"])]
+    pub poke: Option<u64>,
     /// Print all phases, counts and errors
     #[arg(long)]
     pub all: bool,
@@ -98,9 +110,20 @@ struct RunResult {
     errors: Errors,
     truth: Option<TruthError>,
     broken: Option<Broken>,
+    poked: Option<Poked>,
     unchecked: Vec<String>,
     /// Whether the scene must come to rest.
     rests: bool,
+}
+
+/// What random pushes did.
+#[derive(serde::Serialize)]
+struct Poked {
+    seed: u64,
+    pushes: u32,
+    /// Distance at the end from the bodies of a run without pushes: root mean square, and greatest (m).
+    displaced_rms_m: f64,
+    displaced_max_m: f64,
 }
 
 /// A note about bodies whose size is far from the length unit.
@@ -131,10 +154,15 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         return record::run(args, path);
     }
     let settings = settings(args, args.setting.settings()?)?;
-    let files = [("--state", &args.state), ("--contacts", &args.contacts), ("--joints", &args.joints)];
+    let files = [
+        ("--state", &args.state),
+        ("--contacts", &args.contacts),
+        ("--joints", &args.joints),
+        ("--trace", &args.trace),
+    ];
     let files: Vec<(&str, &Path)> =
         files.into_iter().filter_map(|(name, file)| Some((name, file.as_deref()?))).collect();
-    if args.every.is_some() && files.is_empty() {
+    if args.every.is_some() && !files.iter().any(|(name, _)| *name != "--trace") {
         return Err(Error::invalid("every", "needs --state, --contacts, --joints or --record"));
     }
     for (i, (name, file)) in files.iter().enumerate() {
@@ -149,8 +177,15 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let scene = &*scene;
     memory::check("run", scene.bodies.len(), 0, 1)?;
     let mut sheets = Sheets::new(args)?;
+    // Opened now, so that a file that cannot be written is reported before the run.
+    let trace = args.trace.as_deref().map(|path| Pending::new(path).map(|file| (file, path))).transpose()?;
     let bar = Bar::new();
-    let trial = Trial { demands: demands.clone(), truth: truth.as_mut(), ..Trial::new(scene, settings) };
+    let trial = Trial {
+        demands: demands.clone(),
+        truth: truth.as_mut(),
+        poked: args.poke,
+        ..Trial::new(scene, settings.clone())
+    };
     let found = trial.run(&mut |world| {
         if world.step_index == 0 {
             note(&size_note(world).unwrap_or_default());
@@ -170,11 +205,25 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     // Metrics evict the caches, so times come from separate runs. Equal bits show that these did the same
     // work.
     let own = Settings { record_impulses: false, ..found.world.settings.clone() };
-    let times = Times::measure(scene, own, found.world.state_hash())?;
+    let (poked, hash) = match args.poke {
+        Some(seed) => {
+            let still = Trial { measured: 0, ..Trial::new(scene, settings) }.run(&mut |_| Ok(()))?.world;
+            let [displaced_rms_m, displaced_max_m] = pokes::displacement(&found.world, &still);
+            (Some(Poked { seed, pushes: found.pokes, displaced_rms_m, displaced_max_m }), still.state_hash())
+        }
+        None => (None, found.world.state_hash()),
+    };
+    let times = Times::measure(scene, own, hash)?;
     let TrialOutcome { world, errors, truth, broken, .. } = found;
     let errors = errors.ok_or_else(|| Error::invalid("run", "no step was measured"))?;
-    let found = RunResult { times, errors, truth, broken, unchecked: unchecked.clone(), rests };
-    let written = sheets.commit()?;
+    let found = RunResult { times, errors, truth, broken, poked, unchecked: unchecked.clone(), rests };
+    let mut written = sheets.commit()?;
+    if let Some((mut file, path)) = trace {
+        let text = trace::text(&scene.name, world.settings.solver.name, &found.times)?;
+        file.write_all(text.as_bytes()).map_err(Error::io(path))?;
+        file.commit()?;
+        written += &format!("wrote {}\n", path.display());
+    }
     if args.json {
         return print_json(&json(&world, scene, &found)?);
     }
@@ -277,6 +326,13 @@ impl RunResult {
             ("residual speed, last second", si(e.rest_velocity(), "m/s"), "rms".into()),
             ("energy change", ratio(at("energy_change")), "relative; positive is a gain".into()),
         ]);
+        if let Some(Poked { seed, pushes, displaced_rms_m, displaced_max_m }) = &self.poked {
+            let rest = format!(
+                "rms; greatest {}; {pushes} pushes in the first half, seed {seed}",
+                si(*displaced_max_m, "m")
+            );
+            lines.push(("displaced by pokes", si(*displaced_rms_m, "m"), rest));
+        }
         lines
     }
 
@@ -333,6 +389,7 @@ fn json(world: &World, scene: &Scene, found: &RunResult) -> Result<Value, Error>
         "reference": value(&found.truth)?,
         "holds": found.broken.map_or("yes", |b| b.mark.word()),
         "failed_step": found.broken.map(|b| b.step),
+        "poked": found.poked,
         "not_checked": found.unchecked,
     }))
 }

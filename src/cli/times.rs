@@ -1,7 +1,7 @@
 //! The times of a run, measured separately from its errors.
 
 use crate::engine::clock::Phase;
-use crate::engine::world::{Settings, World};
+use crate::engine::world::{Settings, StepCounts, World};
 use crate::lab::error::Error;
 use crate::lab::scenes::Scene;
 use crate::lab::study::interleave::time_in_turns;
@@ -18,7 +18,9 @@ pub struct Times {
     /// Times of steps, measured as in a study.
     pub sample: Sample,
     /// Times of phases, with the clock read around each (ns).
-    phases: [Vec<f64>; Phase::ALL.len()],
+    pub phases: [Vec<f64>; Phase::ALL.len()],
+    /// Counts of each step.
+    pub counts: Vec<StepCounts>,
     /// Whether the timed passes ended in the same bits as the run whose errors were measured.
     pub same_bits: bool,
 }
@@ -30,12 +32,14 @@ impl Times {
     pub fn measure(scene: &Scene, settings: Settings, hash: u64) -> Result<Self, Error> {
         let start = Instant::now();
         let mut phases: [Vec<f64>; Phase::ALL.len()] = Default::default();
+        let mut counts = Vec::new();
         let mut world: World = scene.build(Settings { timed: true, ..settings.clone() })?;
         for _ in 0..scene.steps {
             world.step().map_err(|d| Error::invalid("time", d.to_string()))?;
             for (times, &ns) in phases.iter_mut().zip(&world.timings.phase_ns) {
                 times.push(ns as f64);
             }
+            counts.push(world.counts);
         }
         let passes = if start.elapsed() * PASSES > PATIENCE { 1 } else { PASSES };
         let sample = time_in_turns(scene, &[settings], scene.steps, passes, 1)?.pop();
@@ -45,7 +49,7 @@ impl Times {
             None => return Err(Error::invalid("time", "nothing was timed")),
         };
         let same_bits = sample.hash == hash && world.state_hash() == hash;
-        Ok(Times { sample, phases, same_bits })
+        Ok(Times { sample, phases, counts, same_bits })
     }
 
     /// Median times (ns) of the phases that the solver has.

@@ -91,12 +91,14 @@
 //! units  memory  parallel        human-readable numbers; what fits in memory; jobs on threads
 //! reference  metrics             certified solutions; errors read from states
 //! scenes  capture  picture       what is simulated, and its known truth; frozen problems; frames drawn
+//! pokes                          random pushes
 //! trial                          one run to its verdict
 //! recording  chart               whole runs in a file, and the page that plays them; charts as SVG
 //! study  converge  verify        solver × scene × budget; iterations to a tolerance; hard cases
 //! report                         tables, plots, records
 //! profile  compare               phases against the roofline, cost by size; two studies side by side
 //! ablate                         what each mechanism of a solver is for
+//! view                           worlds side by side, and what a player does to them
 //! torture                        scenes at random, and what no solver may do in them
 //! ```
 
@@ -118,6 +120,7 @@ pub mod overrides;
 #[doc(hidden)]
 pub mod parallel;
 pub mod picture;
+pub mod pokes;
 pub mod profile;
 pub mod recording;
 pub mod reference;
@@ -129,3 +132,4 @@ pub mod trial;
 #[doc(hidden)]
 pub mod units;
 pub mod verify;
+pub mod view;

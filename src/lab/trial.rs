@@ -22,6 +22,7 @@ use crate::engine::world::{Divergence, Settings, StepError, World};
 use crate::lab::error::Error;
 use crate::lab::interned::{self, Name};
 use crate::lab::metrics::{Errors, Observation};
+use crate::lab::pokes::Pokes;
 use crate::lab::scenes::holds::{Broken, Demand, SceneMonitor};
 use crate::lab::scenes::{Loaded, Scene, Truth};
 
@@ -42,6 +43,8 @@ pub struct Trial<'a> {
     pub measured: u64,
     /// Whether the trial ends at the first violated condition.
     pub until_broken: bool,
+    /// Seed of the pushes in the first half of the run; `None` for none.
+    pub poked: Option<u64>,
 }
 
 /// Result of a trial.
@@ -56,6 +59,8 @@ pub struct TrialOutcome {
     pub truth: Option<TruthError>,
     /// The first violated condition.
     pub broken: Option<Broken>,
+    /// Number of pushes.
+    pub pokes: u32,
 }
 
 impl<'a> Trial<'a> {
@@ -70,6 +75,7 @@ impl<'a> Trial<'a> {
             steps,
             measured: steps,
             until_broken: false,
+            poked: None,
         }
     }
 
@@ -84,14 +90,18 @@ impl<'a> Trial<'a> {
     ///
     /// Errors: a scene that cannot be built, and those of the observer.
     pub fn run(self, observer: &mut dyn FnMut(&World) -> Result<(), Error>) -> Result<TrialOutcome, Error> {
-        let Trial { scene, settings, demands, mut truth, steps, measured, until_broken } = self;
+        let Trial { scene, settings, demands, mut truth, steps, measured, until_broken, poked } = self;
         let mut world = scene.build(settings)?;
         let mut watch = SceneMonitor::new(&world, demands);
+        let mut pokes = poked.map(|seed| Pokes::new(seed, &world, steps / 2));
         let (mut observation, mut failure) = (None, None);
         observer(&world)?;
         for step in 0..steps {
             if step + measured >= steps {
                 observation.get_or_insert_with(|| Observation::new(&world));
+            }
+            if let Some(pokes) = &mut pokes {
+                pokes.act(&mut world)?;
             }
             failure = world.step().err().and_then(StepError::divergence);
             if failure.is_some() {
@@ -118,6 +128,7 @@ impl<'a> Trial<'a> {
             errors: observation.filter(|_| well).map(|o| o.errors()),
             truth: truth.filter(|_| well).map(|truth| TruthError::of(truth)),
             broken: watch.broken(),
+            pokes: pokes.map_or(0, |pokes| pokes.given()),
             failure,
             world,
         })

@@ -1,7 +1,21 @@
 //! A real browser without a window: Chromium, if installed.
 
+use crate::socket;
+use serde_json::{Value, json};
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
+use tungstenite::Message;
+
+const OPTIONS: [&str; 7] = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-dev-shm-usage",
+    "--hide-scrollbars",
+    "--no-first-run",
+    "--disable-extensions",
+];
 
 /// Path of Chromium: the variable `CHROMIUM`, or one of its usual names on the path.
 fn find() -> Option<PathBuf> {
@@ -52,8 +66,8 @@ pub fn drive(page: &Path, fragment: &str, script: &str) -> Option<serde_json::Va
     let head = head.replacen("<head>", &format!("<head>{before}"), 1);
     std::fs::write(&copy, format!("{head}{after}{tail}")).unwrap();
     let output = Command::new(browser)
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars"])
-        .args(["--no-first-run", "--disable-extensions", "--virtual-time-budget=20000", "--dump-dom"])
+        .args(OPTIONS)
+        .args(["--virtual-time-budget=20000", "--dump-dom"])
         .arg(format!("--user-data-dir={}", folder.path().join("profile").display()))
         .args(["--window-size=1300,900", &format!("file://{}#{fragment}", copy.display())])
         .output()
@@ -66,4 +80,64 @@ pub fn drive(page: &Path, fragment: &str, script: &str) -> Option<serde_json::Va
     let found: serde_json::Value = serde_json::from_str(&plain).unwrap();
     assert_eq!(found["faults"], serde_json::json!([]), "{found}");
     Some(found)
+}
+
+/// Opens an address and runs the body of an async function there, in real time, by the DevTools protocol. Returns its
+/// object, after checking that the page had no errors. Without a browser: `None`, and a
+/// printed line.
+pub fn visit(address: &str, script: &str) -> Option<Value> {
+    let Some(browser) = find() else {
+        eprintln!("SKIPPED {address}: no Chromium on the path; install the package chromium");
+        return None;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let mut child = Command::new(browser)
+        .args(OPTIONS)
+        .args(["--remote-debugging-port=0", "--window-size=1400,1000"])
+        .arg(format!("--user-data-dir={}", folder.path().display()))
+        .arg("about:blank")
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let lines = BufReader::new(child.stderr.take().unwrap()).lines();
+    let own =
+        lines.map_while(Result::ok).find_map(|line| Some(line.split_once("ws://")?.1.to_string())).unwrap();
+    let (host, path) = own.split_once('/').unwrap();
+    let mut tools = socket::connect(host, &format!("/{path}"), None).unwrap();
+    let (mut number, mut faults) = (0, Vec::new());
+    let mut call = |session: Option<&str>, method: &str, parameters: Value| -> Value {
+        number += 1;
+        let mut message = json!({ "id": number, "method": method, "params": parameters });
+        session.into_iter().for_each(|session| message["sessionId"] = session.into());
+        tools.send(Message::text(message.to_string())).unwrap();
+        loop {
+            let Message::Text(text) = tools.read().unwrap() else { continue };
+            let answer: Value = serde_json::from_str(&text).unwrap();
+            if answer["id"] == number {
+                return answer["result"].clone();
+            }
+            if answer["method"] == "Runtime.exceptionThrown" {
+                faults.push(answer["params"]["exceptionDetails"].to_string());
+            }
+        }
+    };
+    let target = call(None, "Target.createTarget", json!({ "url": "about:blank" }));
+    let attached =
+        call(None, "Target.attachToTarget", json!({ "targetId": target["targetId"], "flatten": true }));
+    let session = Some(attached["sessionId"].as_str().unwrap());
+    call(session, "Runtime.enable", json!({}));
+    call(session, "Page.enable", json!({}));
+    call(session, "Page.navigate", json!({ "url": address }));
+    let expression = format!(
+        "(async () => {{ const pause = (ms) => new Promise((done) => setTimeout(done, ms));
+            const until = async (is) => {{ for (let i = 0; i < 400 && !is(); i++) await pause(50); return is(); }};
+            {script} }})()"
+    );
+    let options = json!({ "expression": expression, "awaitPromise": true, "returnByValue": true });
+    let found = call(session, "Runtime.evaluate", options);
+    let _ = child.kill();
+    let _ = child.wait();
+    assert!(faults.is_empty() && found["exceptionDetails"].is_null(), "{faults:?} {found}");
+    Some(found["result"]["value"].clone())
 }

@@ -6,6 +6,8 @@ mod browser;
 mod documents;
 mod replay;
 mod report;
+mod socket;
+mod view;
 
 use simpulse::engine::solvers::VARIANTS;
 use simpulse::lab::report::study_file::StudyFile;
@@ -151,6 +153,8 @@ fn bad_requests_are_refused_in_one_line() {
         ("run stack:2 --dt 0", &["dt", "0"]),
         ("run stack:2 --dt -0.1", &["dt", "-0.1"]),
         ("run stack:2 --dt nan", &["dt"]),
+        ("run stack:2 --poke x", &["--poke", "'x'"]),
+        ("run stack:2 --poke 1 --record r.html", &["--poke", "--record"]),
         ("run stack:2 --steps 0", &["steps", "0"]),
         ("run stack:2 --every 0 --state s.csv", &["every", "0"]),
         ("run stack:2 --every 5", &["every", "--state"]),
@@ -199,6 +203,52 @@ fn bad_scene_files_are_refused_with_their_place() {
         refused(folder.path(), &format!("run {name} --state s.csv"), &[name, part]);
         refused(folder.path(), &format!("study --scenes {name} --quick"), &[name, part]);
     }
+}
+
+#[test]
+fn a_trace_has_the_phases_of_every_step_without_gaps() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let printed = succeeds(path, "run smash --steps 40 --trace t.json");
+    assert!(printed.contains("wrote t.json"), "{printed}");
+    let trace: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(path.join("t.json")).unwrap()).unwrap();
+    let all: Vec<&serde_json::Value> = trace["traceEvents"].as_array().unwrap().iter().collect();
+    let spans: Vec<_> = all.iter().filter(|e| e["ph"] == "X").collect();
+    let is_step = |e: &serde_json::Value| e["name"].as_str().unwrap().starts_with("step ");
+    let number = |e: &serde_json::Value, name: &str| e[name].as_f64().unwrap();
+    assert_eq!(spans.iter().filter(|e| is_step(e)).count(), 40);
+    let mut end = 0.0;
+    for step in spans.chunk_by(|_, next| !is_step(next)) {
+        assert!(is_step(step[0]) && (number(step[0], "ts") - end).abs() < 1e-6 && step.len() > 5);
+        for phase in &step[1..] {
+            assert!((number(phase, "ts") - end).abs() < 1e-6 && number(phase, "dur") > 0.0, "{phase}");
+            end += number(phase, "dur");
+        }
+        assert!((number(step[0], "ts") + number(step[0], "dur") - end).abs() < 1e-6);
+    }
+    refused(path, "run smash --trace no/such/t.json", &["no/such/t.json"]);
+    refused(path, "run smash --trace t.csv --state t.csv", &["same file"]);
+    refused(path, "run smash --trace t2.json --every 2", &["every"]);
+}
+
+#[test]
+fn a_poked_run_says_what_the_pushes_did() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |options: &str| -> serde_json::Value {
+        serde_json::from_str(&succeeds(folder.path(), &format!("run stack:6 --steps 600 --json {options}")))
+            .unwrap()
+    };
+    let (still, poked) = (run(""), run("--poke 5"));
+    assert!(still["poked"].is_null());
+    assert_eq!((&poked["holds"], &poked["poked"]["seed"]), (&"yes".into(), &5.into()));
+    // In 5 s, one every 0.1 to 0.5 s.
+    assert!((10..=50).contains(&poked["poked"]["pushes"].as_u64().unwrap()), "{poked}");
+    let [rms, most] =
+        ["displaced_rms_m", "displaced_max_m"].map(|name| poked["poked"][name].as_f64().unwrap());
+    assert!(0.0 < rms && rms <= most && most < 0.1, "{poked}");
+    assert_eq!(poked["bits_equal"], true);
+    assert_eq!(run("--poke 5")["poked"], poked["poked"]);
 }
 
 #[test]

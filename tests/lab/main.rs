@@ -27,6 +27,7 @@ mod solver2d;
 mod solver_rules;
 mod truth;
 mod verify;
+mod view;
 mod warm_starting;
 mod watch;
 mod width_invariance;

@@ -44,4 +44,28 @@ impl World {
             self.counts.constraint_bytes += 4 * self.counts.lane_slots * stride;
         }
     }
+
+    /// Color of each contact of the last step, numbered in solving order; contacts of a color are solved at the same
+    /// time. `None` for contacts that are solved one by one.
+    ///
+    /// ```
+    /// use simpulse_engine::bodies::{BodyDef, ShapeDef};
+    /// use simpulse_engine::{solvers, world::{Settings, World}};
+    ///
+    /// let mut world = World::new(Settings::new(solvers::find("soft_step")?));
+    /// world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(9.0, 1.0)?))?;
+    /// for y in [0.5, 1.5, 2.5] {
+    ///     world.add_body(&BodyDef::dynamic([0.0, y]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
+    /// }
+    /// world.step()?;
+    /// // Contacts with the ground are colored on their own, after those between two boxes, which share the middle one.
+    /// assert_eq!(world.contact_colors(), [Some(2), Some(0), Some(1)]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn contact_colors(&self) -> Vec<Option<u16>> {
+        match self.settings.order {
+            Order::Colored => self.assignment.contact_colors(self.contacts.len()),
+            _ => vec![None; self.contacts.len()],
+        }
+    }
 }

@@ -6,7 +6,7 @@ use super::frame::Stage;
 use super::outline::placed;
 use super::svg::Drawing;
 use crate::engine::bodies::BodyKind;
-use crate::engine::joints::JointKind;
+use crate::engine::joints::{Joint, JointHandle, JointKind};
 use crate::engine::world::World;
 
 /// The data of a joint that does not change while a world runs.
@@ -33,11 +33,15 @@ impl JointRecord {
 const COLOR: Color = Color::rgb(0x7a3e9d);
 const INSIDE: Color = Color::rgb(0xfbf7fd);
 
-/// All joints of a world that constrain anything.
+/// The joints of a world that constrain anything, in the order of [`records`].
+pub fn drawn(world: &World) -> impl Iterator<Item = (JointHandle, &Joint)> {
+    world.joints().filter(|(_, joint)| joint.kind != JointKind::Filter)
+}
+
+/// How the joints of a world that constrain anything are drawn.
 pub fn records(world: &World) -> Vec<JointRecord> {
-    let of = |(_, joint): (_, &crate::engine::joints::Joint)| {
+    let of = |(_, joint): (_, &Joint)| {
         let (mark, axis) = match &joint.kind {
-            JointKind::Filter => return None,
             JointKind::Prismatic(of) => ("prismatic", of.axis),
             JointKind::Wheel(of) => ("wheel", of.axis),
             JointKind::Distance(of) if of.spring.is_some() => ("spring", [0.0; 2]),
@@ -52,9 +56,9 @@ pub fn records(world: &World) -> Vec<JointRecord> {
         let length = axis[0].hypot(axis[1]);
         let axis = if length > 0.0 { axis.map(|x| x / length) } else { axis };
         let anchors = [from_center(a, bodies[0]), from_center(b, bodies[1])];
-        Some(JointRecord { mark: mark.into(), bodies: bodies.map(|i| i as u32), anchors, axis })
+        JointRecord { mark: mark.into(), bodies: bodies.map(|i| i as u32), anchors, axis }
     };
-    world.joints().filter_map(of).collect()
+    drawn(world).map(of).collect()
 }
 
 /// Draws the joints of a stage with bodies at `poses`, `size` pixels wide; `at` maps positions on the stage (m) to

@@ -1,17 +1,20 @@
 "use strict";
-// Draws a frame of a run on a canvas, and nothing else: no state, no controls.
+// Draws a frame of a run on a canvas, and curves over time, and nothing else: no state, no controls.
 //
 // A run is `{ header fields, frames }` with the header of src/lab/recording/mod.rs. A frame is
 // `{ poses, points, values }`: poses hold x, y (m) and angle (rad) of every body in turn; a point is
-// `{ a, b, x, y, separation, ix, iy }` with the impulse on body b.
+// `{ a, b, x, y, separation, ix, iy }` with the impulse on body b. A frame may have `depths`, the deepest overlap (m) of
+// each body, and `islands`, a number for each; points may have a `color`, a number.
+//
+// Paths are long and few: what has the same colors is filled and stroked together.
 const drawing = (() => {
   const LIGHT = {
     ramp: [[243, 245, 248], [253, 228, 160], [245, 155, 75], [204, 61, 51], [107, 16, 48]],
-    paper: "#fff", ink: "#1f2933", edge: "#52606d", fixed: "#d3d8de", moved: "#d9d2e9", body: "#e3ebf5", grid: "#e4e7eb", force: "#0072b2",
+    paper: "#fff", ink: "#1f2933", edge: "#52606d", fixed: "#d3d8de", moved: "#d9d2e9", body: "#e3ebf5", small: "#b8c4d2", grid: "#e4e7eb", force: "#0072b2", bad: "#fbe9e3",
   };
   const DARK = {
     ramp: [[38, 49, 61], [110, 52, 48], [204, 81, 51], [245, 165, 75], [255, 240, 180]],
-    paper: "#14181d", ink: "#e4e7eb", edge: "#9aa5b1", fixed: "#3e4c59", moved: "#3d3557", body: "#26313d", grid: "#323f4b", force: "#7cc4f5",
+    paper: "#14181d", ink: "#e4e7eb", edge: "#9aa5b1", fixed: "#3e4c59", moved: "#3d3557", body: "#26313d", small: "#52606d", grid: "#323f4b", force: "#7cc4f5", bad: "#3b2420",
   };
   const isDark = matchMedia("(prefers-color-scheme: dark)");
   const theme = () => (isDark.matches ? DARK : LIGHT);
@@ -70,6 +73,10 @@ const drawing = (() => {
     return box.every(Number.isFinite) ? box : [-1, -1, 1, 1];
   }
 
+  // Angles between successive hues that no short list of numbers repeats (degrees), and their number.
+  const HUE = 137.5, HUES = 24;
+  const hue = (number) => `hsl(${(HUE * (number % HUES)) % 360} ${isDark.matches ? "45% 42%" : "60% 74%"})`;
+
   // A point of a body's frame at its place in the scene (m).
   function placed(poses, body, [u, v]) {
     const [x, y, angle] = poses.subarray(3 * body, 3 * body + 3);
@@ -112,10 +119,11 @@ const drawing = (() => {
     const { ink, paper } = theme(), { box } = all;
     const scale = scaleOf(all, view, w, h);
     const cx = 0.5 * (box[0] + box[2]) + view.x, cy = 0.5 * (box[1] + box[3]) + view.y;
-    const to = ([x, y]) => [0.5 * w + scale * (x - cx), 0.5 * (h - STRIP) - scale * (y - cy)];
-    shapes(c, run, frame, all, view, scale, to);
+    const left = 0.5 * w - scale * cx, top = 0.5 * (h - STRIP) + scale * cy;
+    const to = ([x, y]) => [left + scale * x, top - scale * y];
+    shapes(c, run, frame, all, view, { scale, left, top, w, h });
     if (view.joints) joints(c, run, frame, all, scale, to);
-    if (view.forces) forces(c, frame, all, scale, to);
+    if (view.forces || view.colors) points(c, frame, all, view, scale, to);
     // A bar of a round length.
     const most = 0.25 * w / scale, power = 10 ** Math.floor(Math.log10(most));
     const meters = [5, 2, 1].map((n) => n * power).find((n) => n <= most) || power;
@@ -134,36 +142,92 @@ const drawing = (() => {
     c.stroke();
   }
 
-  function shapes(c, { shapes: all, kinds }, { poses, points }, { size, thickness, deepest }, { depths }, scale, to) {
-    const { edge, fixed, moved, body: plain } = theme();
-    const depth = new Float64Array(kinds.length);
-    for (const p of points) for (const i of [p.a, p.b]) depth[i] = Math.max(depth[i], -p.separation);
+  // Number of shapes in a path. The time of a path grows faster than its length.
+  const TOGETHER = 16;
+  // Bodies are small below this size (pixels) if there are more than these, and have gaps of this width (pixels).
+  const SMALL = 9, MANY = 2000, GAP = 0.9;
+  // Shades of a depth.
+  const SHADES = 32;
+
+  function shapes(c, { shapes: all, kinds }, { poses, points, depths, islands }, { size, thickness, deepest }, view, place) {
+    const { edge, fixed, moved, body: plain, small: empty } = theme();
+    const { scale } = place;
+    const depth = depths || new Float64Array(kinds.length);
+    if (!depths) for (const p of points) for (const i of [p.a, p.b]) depth[i] = Math.max(depth[i], -p.separation);
     c.lineJoin = "round";
     c.lineWidth = clamp(0.03 * size * scale, 0.5, 1.2);
-    const shown = depths && deepest > 0, thin = thickness * scale < 3;
-    for (const { body, points: corners, radius } of all) {
-      const at = corners.map((corner) => to(placed(poses, body, corner)));
-      const r = radius * scale, share = depth[body] / deepest;
-      const kind = kinds[body];
-      // What is too thin for an inside shows its color on its border.
-      c.strokeStyle = kind === "d" && shown && thin && depth[body] > 0 ? ramp(0.3 + 0.7 * share) : edge;
-      c.fillStyle = kind === "s" ? fixed : kind === "k" ? moved : shown ? ramp(share) : plain;
-      c.beginPath();
-      if (at.length === 1) {
-        const [[x, y]] = at, angle = poses[3 * body + 2];
-        c.arc(x, y, r, 0, 2 * Math.PI);
-        c.moveTo(x, y);
-        c.lineTo(x + r * Math.cos(angle), y - r * Math.sin(angle));
-      } else {
-        // Around the vertices of the core, an arc at each; y points down, so clockwise here.
-        const n = at.length;
-        const normal = ([ax, ay], [bx, by]) => Math.atan2(bx - ax, ay - by);
-        at.forEach(([x, y], i) => c.arc(x, y, r, normal(at[(i + n - 1) % n], at[i]), normal(at[i], at[(i + 1) % n]), true));
-        c.closePath();
-      }
-      c.fill();
-      c.stroke();
+    const shown = view.depths && deepest > 0, thin = thickness * scale < 3;
+    const tones = (low) => Array.from({ length: SHADES + 1 }, (_, i) => ramp(low + (1 - low) * i / SHADES));
+    const [insides, borders] = [tones(0), tones(0.3)];
+    // Borders of many small bodies take as long as their insides: gaps take their place.
+    const small = !thin && size * scale < SMALL && all.length > MANY, shrink = small ? 1 - GAP / (size * scale) : 1;
+    const batches = new Map();
+    // Cosine and sine of each angle, in pixels per meter.
+    const turns = new Float64Array(2 * kinds.length);
+    for (let i = 0; i < kinds.length; i++) {
+      const own = kinds[i] === "d" ? scale * shrink : scale;
+      turns[2 * i] = own * Math.cos(poses[3 * i + 2]);
+      turns[2 * i + 1] = own * Math.sin(poses[3 * i + 2]);
     }
+    for (const shape of all) {
+      const { body } = shape, kind = kinds[body];
+      if (kind !== "s" && !isSeen(shape, poses, place)) continue;
+      const tone = shown ? Math.round(SHADES * Math.min(Math.max(depth[body], 0) / deepest, 1)) : 0;
+      // What is too thin for an inside shows its color on its border.
+      const border = kind === "d" && shown && thin && depth[body] > 0 ? borders[tone] : edge;
+      const inside = kind === "s" ? fixed : kind === "k" ? moved
+        : view.islands && islands ? hue(islands[body]) : shown && (tone || !small) ? insides[tone] : small ? empty : plain;
+      const key = inside + border;
+      let batch = batches.get(key);
+      if (!batch) batches.set(key, batch = { inside, border: small && kind === "d" ? null : border, list: [] });
+      batch.list.push(shape);
+    }
+    for (const { inside, border, list } of batches.values()) {
+      c.fillStyle = inside;
+      if (border) c.strokeStyle = border;
+      for (let i = 0; i < list.length; i += TOGETHER) {
+        c.beginPath();
+        for (let k = i; k < Math.min(i + TOGETHER, list.length); k++) outline(c, list[k], poses, turns, place);
+        c.fill();
+        if (border) c.stroke();
+      }
+    }
+  }
+
+  // Whether a shape is on the canvas.
+  function isSeen(shape, poses, { scale, left, top, w, h }) {
+    shape.reach ??= shape.radius + largest(shape.points, (p) => Math.hypot(...p));
+    const x = left + scale * poses[3 * shape.body], y = top - scale * poses[3 * shape.body + 1], r = scale * shape.reach;
+    return x + r > 0 && x - r < w && y + r > 0 && y - r < h;
+  }
+
+  // Adds a closed outline to the path: that of the vertices, with an arc around each if there is a radius.
+  function outline(c, { body, points, radius }, poses, turns, { scale, left, top }) {
+    const ox = left + scale * poses[3 * body], oy = top - scale * poses[3 * body + 1];
+    const cos = turns[2 * body], sin = turns[2 * body + 1], r = radius * Math.hypot(cos, sin), n = points.length;
+    const x = (p) => ox + cos * p[0] - sin * p[1], y = (p) => oy - sin * p[0] - cos * p[1];
+    if (n === 1) {
+      const cx = x(points[0]), cy = y(points[0]);
+      c.moveTo(cx + r, cy);
+      c.arc(cx, cy, r, 0, 2 * Math.PI);
+      c.moveTo(cx, cy);
+      c.lineTo(cx + radius * cos, cy - radius * sin);
+      return;
+    }
+    if (r === 0) {
+      c.moveTo(x(points[0]), y(points[0]));
+      for (let i = 1; i < n; i++) c.lineTo(x(points[i]), y(points[i]));
+      return c.closePath();
+    }
+    // y points down, so clockwise here.
+    const at = points.map((p) => [x(p), y(p)]);
+    const normal = ([ax, ay], [bx, by]) => Math.atan2(bx - ax, ay - by);
+    at.forEach(([px, py], i) => {
+      const from = normal(at[(i + n - 1) % n], at[i]);
+      if (i === 0) c.moveTo(px + r * Math.cos(from), py + r * Math.sin(from));
+      c.arc(px, py, r, from, normal(at[i], at[(i + 1) % n]), true);
+    });
+    c.closePath();
   }
 
   // A line between the anchors, or along the axis if there is one, and a circle or a square at that of b.
@@ -197,30 +261,79 @@ const drawing = (() => {
     }
   }
 
-  // Contact points, and impulses as arrows; an impact is cut at three bodies' widths.
-  function forces(c, { points }, { size, carried }, scale, to) {
+  // Contact points, dark or in their own color, and impulses as arrows; an impact is cut at three bodies' widths.
+  function points(c, { points: all }, { size, carried }, view, scale, to) {
     const { ink, force } = theme();
-    const unit = 1.1 * size * scale / carried, dot = clamp(0.05 * size * scale, 0.6, 3);
-    for (const p of points) {
-      const [x, y] = to([p.x, p.y]);
-      const cut = Math.min(1, 3 * size * scale / Math.max(unit * Math.hypot(p.ix, p.iy), 1e-9));
-      const [dx, dy] = [unit * cut * p.ix, -unit * cut * p.iy];
-      const length = Math.hypot(dx, dy);
-      c.fillStyle = ink;
-      c.fillRect(x - dot, y - dot, 2 * dot, 2 * dot);
-      if (length < 1.5) continue;
-      const head = Math.min(6, 0.5 * length), [u, v] = [dx / length, dy / length];
-      const [hx, hy] = [x + dx - head * u, y + dy - head * v];
-      c.strokeStyle = c.fillStyle = force;
-      c.lineWidth = Math.min(1.4, 0.6 + 0.02 * size * scale);
-      stroke(c, [x, y], [hx, hy]);
+    const dot = (view.colors ? 2 : 1) * clamp(0.05 * size * scale, 0.6, 3);
+    const dots = new Map();
+    for (const p of all) {
+      const color = view.colors && p.color >= 0 ? hue(p.color) : ink;
+      if (!dots.has(color)) dots.set(color, []);
+      dots.get(color).push(p);
+    }
+    for (const [color, list] of dots) {
+      c.fillStyle = color;
       c.beginPath();
-      c.moveTo(x + dx, y + dy);
-      c.lineTo(hx - 0.4 * head * v, hy + 0.4 * head * u);
-      c.lineTo(hx + 0.4 * head * v, hy - 0.4 * head * u);
+      for (const p of list) {
+        const [x, y] = to([p.x, p.y]);
+        c.rect(x - dot, y - dot, 2 * dot, 2 * dot);
+      }
       c.fill();
     }
+    if (!view.forces) return;
+    const unit = 1.1 * size * scale / carried, most = 3 * size * scale, arrows = [];
+    for (const p of all) {
+      const length = unit * Math.hypot(p.ix, p.iy), cut = unit * Math.min(1, most / Math.max(length, 1e-9));
+      if (length * cut >= 1.5 * unit) arrows.push([...to([p.x, p.y]), cut * p.ix, -cut * p.iy]);
+    }
+    const heads = (draw) => {
+      c.beginPath();
+      for (const [x, y, dx, dy] of arrows) {
+        const length = Math.hypot(dx, dy), head = Math.min(6, 0.5 * length), u = dx / length, v = dy / length;
+        draw(x, y, x + dx - head * u, y + dy - head * v, x + dx, y + dy, 0.4 * head * u, 0.4 * head * v);
+      }
+    };
+    c.strokeStyle = c.fillStyle = force;
+    c.lineWidth = Math.min(1.4, 0.6 + 0.02 * size * scale);
+    heads((x, y, hx, hy) => { c.moveTo(x, y); c.lineTo(hx, hy); });
+    c.stroke();
+    heads((x, y, hx, hy, tx, ty, u, v) => { c.moveTo(tx, ty); c.lineTo(hx - v, hy + u); c.lineTo(hx + v, hy - u); });
+    c.fill();
   }
 
-  return { isDark, theme, si, clear, clamp, stroke, measures, scaleOf, scene, STRIP };
+  // A curve on a logarithmic scale from `low` to `high` in the box from `left`, `top` to `right`, `bottom`, below its
+  // `name` and a `text`. `line` holds x (pixels) and value of each point, `mark` is one of them or null. Above `limit`,
+  // if there is one, the box is red.
+  function strip(c, { left, top, right, bottom }, { name, text, color, low, high, line, mark, limit }) {
+    const { ink, grid, bad } = theme();
+    const up = (v) => bottom - (bottom - top) * clamp(Math.log(Math.max(v, low) / low) / Math.log(high / low), 0, 1);
+    if (limit > 0 && limit < high) {
+      c.fillStyle = bad;
+      c.fillRect(left, top, right - left, up(limit) - top);
+    }
+    c.strokeStyle = grid;
+    c.lineWidth = 1;
+    for (let d = Math.ceil(Math.log10(low)); d <= Math.log10(high); d++) stroke(c, [left, up(10 ** d)], [right, up(10 ** d)]);
+    // The darkest color of a solver is that of text.
+    c.strokeStyle = color === "#222222" ? ink : color;
+    c.lineWidth = 1.6;
+    stroke(c, ...line.map(([x, value]) => [x, up(value)]));
+    label(c, { left, top, right }, name, text);
+    if (!mark) return;
+    c.beginPath();
+    c.arc(mark[0], up(mark[1]), 3, 0, 7);
+    c.fill();
+  }
+
+  // Texts above a strip, at its left and its right.
+  function label(c, { left, top, right }, name, text) {
+    c.fillStyle = theme().ink;
+    c.textAlign = "left";
+    c.fillText(name, left, top - 4);
+    c.textAlign = "right";
+    c.fillText(text, right, top - 4);
+    c.textAlign = "left";
+  }
+
+  return { isDark, theme, si, clear, clamp, stroke, strip, label, measures, scaleOf, scene, STRIP };
 })();

@@ -64,7 +64,7 @@ mod tests {
                 frames.push(frame(&world));
             }
         }
-        (recorder.finish("holds").unwrap(), frames)
+        (recorder.finish("holds").unwrap().0, frames)
     }
 
     #[test]

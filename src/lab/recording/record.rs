@@ -59,16 +59,6 @@ impl Recorder {
         // Without gravity, that of 1 m/s² counts.
         let speed = stage.dt * Some(gx.hypot(gy)).filter(|g| *g > 0.0).unwrap_or(1.0);
         let impulse = unit(masses.reduce(f64::min).unwrap_or(1.0) * speed);
-        let shape = |(body, shape): &(u32, Shape)| {
-            let mut points = Vec::new();
-            shape.for_each_vertex(|v| points.push(v.to_array()));
-            ShapeRecord { body: *body, points, radius: shape.radius() }
-        };
-        let letter = |kind: &BodyKind| match kind {
-            BodyKind::Static => 's',
-            BodyKind::Kinematic => 'k',
-            BodyKind::Dynamic => 'd',
-        };
         let header = Header {
             scene: caption.scene,
             solver: caption.solver,
@@ -77,7 +67,7 @@ impl Recorder {
             dt: stage.dt,
             every: every.max(1),
             units: [length, length / FINER, impulse],
-            kinds: stage.kinds.iter().map(letter).collect(),
+            kinds: stage.kinds.iter().map(|kind| letter(*kind)).collect(),
             shapes: stage.shapes.iter().map(shape).collect(),
             joints: stage.joints.clone(),
             contacts,
@@ -141,12 +131,12 @@ impl Recorder {
         self.last = [poses, points];
     }
 
-    /// The file; `outcome` describes how the run ended.
-    pub fn finish(mut self, outcome: &str) -> Result<Vec<u8>, Error> {
+    /// The file and its header; `outcome` describes how the run ended.
+    pub fn finish(mut self, outcome: &str) -> Result<(Vec<u8>, Header), Error> {
         self.recording.header.outcome = outcome.to_string();
         let text =
             serde_json::to_vec(&self.recording).map_err(|e| Error::invalid("record", e.to_string()))?;
-        Ok(miniz_oxide::deflate::compress_to_vec_zlib(&text, 7))
+        Ok((miniz_oxide::deflate::compress_to_vec_zlib(&text, 7), self.recording.header))
     }
 }
 
@@ -174,8 +164,23 @@ pub fn record_trial(
     let outcome = blew_up.or(found.broken.map(|b| b.to_string())).unwrap_or("holds".into());
     let recorder =
         recorder.unwrap_or_else(|| Recorder::new(&found.world, caption(&found.world), every, contacts));
-    let header = Header { outcome: outcome.clone(), ..recorder.recording.header.clone() };
-    Ok((recorder.finish(&outcome)?, header))
+    recorder.finish(&outcome)
+}
+
+/// How a body moves, in [`Header::kinds`].
+pub fn letter(kind: BodyKind) -> char {
+    match kind {
+        BodyKind::Static => 's',
+        BodyKind::Kinematic => 'k',
+        BodyKind::Dynamic => 'd',
+    }
+}
+
+/// A shape of a stage.
+pub fn shape((body, shape): &(u32, Shape)) -> ShapeRecord {
+    let mut points = Vec::new();
+    shape.for_each_vertex(|v| points.push(v.to_array()));
+    ShapeRecord { body: *body, points, radius: shape.radius() }
 }
 
 /// The largest power of ten of which `size` has [`FINENESS`].

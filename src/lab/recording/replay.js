@@ -56,7 +56,7 @@
     });
 
     function drawCurves({ recording, curves, color }) {
-      const { ink, grid } = theme();
+      const { ink } = theme();
       const [c, w, h] = drawing.clear(curves);
       if (!(w > 0)) return;
       const row = h / Math.max(recording.curves.length, 1), left = 6, right = w - 6;
@@ -65,22 +65,11 @@
       c.font = "11px system-ui, sans-serif";
       recording.curves.forEach(([name, unit], k) => {
         const [low, high] = ranges[k], top = k * row + 16, bottom = (k + 1) * row - 4;
-        const up = (v) => bottom - (bottom - top) * Math.log(Math.max(v, low) / low) / Math.log(high / low);
-        c.strokeStyle = grid;
-        c.lineWidth = 1;
-        for (let d = Math.ceil(Math.log10(low)); d <= Math.log10(high); d++) stroke(c, [left, up(10 ** d)], [right, up(10 ** d)]);
-        // The darkest color of a solver is that of text.
-        c.strokeStyle = color === "#222222" ? ink : color;
-        c.lineWidth = 1.6;
-        stroke(c, ...recording.frames.slice(1).map((f, i) => [across((i + 1) * recording.span), up(f.values[k])]));
-        c.fillStyle = ink;
-        c.textAlign = "left";
-        c.fillText(name, left, top - 4);
-        c.textAlign = "right";
-        c.fillText(`${si(recording.frames[now].values[k], unit)}   (log, to ${si(high / 1.3, unit)})`, right, top - 4);
-        c.beginPath();
-        c.arc(across(now * recording.span), up(recording.frames[now].values[k]), 3, 0, 7);
-        c.fill();
+        const value = (i) => recording.frames[i].values[k];
+        const line = recording.frames.slice(1).map((f, i) => [across((i + 1) * recording.span), f.values[k]]);
+        const text = `${si(value(now), unit)}   (log, to ${si(high / 1.3, unit)})`;
+        const mark = [across(now * recording.span), value(now)];
+        drawing.strip(c, { left, top, right, bottom }, { name, text, color, low, high, line, mark });
       });
       c.strokeStyle = ink;
       c.lineWidth = 1;

@@ -2,9 +2,10 @@
 
 use crate::engine::constraints::Impacts;
 use crate::engine::narrowphase::frozen::Freezing;
-use crate::engine::params::Budget;
+use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::{VARIANTS, Variant};
 use crate::lab::error::Error;
+use crate::lab::overrides;
 
 /// Upper limit of every field of a budget, so that a typo does not run for a year.
 pub const LARGEST: u32 = 10_000;
@@ -147,6 +148,18 @@ pub fn with_treatments(text: String, impacts: Impacts, frozen: Freezing) -> Stri
         Freezing::Off => text + " fresh",
         Freezing::Within(_) => format!("{text} frozen {frozen}"),
     }
+}
+
+/// The whole setting: [`brief`], the treatments, and the parameters that differ from the solver's defaults.
+pub fn whole(
+    budget: &Budget,
+    variant: &Variant,
+    treatments: (Impacts, Freezing),
+    own: &Parameters,
+) -> String {
+    let text = with_treatments(brief(budget, variant), treatments.0, treatments.1);
+    let parameters = overrides::brief(variant, own);
+    if parameters.is_empty() { text } else { format!("{text} {parameters}") }
 }
 
 #[cfg(test)]

@@ -125,10 +125,8 @@ struct ErrorCell {
 impl ErrorCell {
     /// Its budget, and the parameters that differ from the solver's defaults.
     fn text(&self) -> String {
-        let budget = budget::brief(&self.tuned.budget, self.solver);
-        let budget = budget::with_treatments(budget, self.impacts, self.frozen);
-        let parameters = overrides::brief(self.solver, &self.tuned.parameters);
-        if parameters.is_empty() { budget } else { format!("{budget} {parameters}") }
+        let TunedBudget { budget, parameters } = &self.tuned;
+        budget::whole(budget, self.solver, (self.impacts, self.frozen), parameters)
     }
 }
 
@@ -307,33 +305,20 @@ fn judge(
         }
         Ok(())
     })?;
-    let TrialOutcome { errors, failure, truth, broken, .. } = found;
+    let TrialOutcome { errors, failure, truth, broken, world, .. } = found;
     let Loaded { scene, tolerances, unchecked, .. } = loaded;
     let Budget { substeps, .. } = cell.tuned.budget;
     let record = Record {
-        bodies: scene.bodies.len(),
-        scene: scene.name,
-        class: SceneClass::default(),
-        dt: scene.dt,
-        solver: cell.solver.name,
-        order,
         lanes: width.lanes(),
-        budget: cell.tuned.budget,
         budget_text: cell.text(),
-        impacts: cell.impacts,
-        frozen: cell.frozen,
-        parameters,
         swept: cell.swept,
-        sample: None,
-        speed_up: None,
         errors: failure.is_none().then(|| errors.unwrap_or_default()),
         truth,
-        tolerances,
         broken: broken.filter(|_| failure.is_none()),
         unchecked,
-        later: None,
-        bits_equal: None,
         failure: failure.map(FailedAt::from),
+        parameters,
+        ..Record::of(&scene, tolerances, &world.settings)
     };
     let work = (sweeps as f64 + steps as f64 * f64::from(substeps)) / (steps as f64).max(1.0);
     Ok(JudgedRun { record, hash, work })

@@ -14,6 +14,7 @@ use crate::lab::error::Error;
 use crate::lab::interned::{self, Name};
 use crate::lab::metrics::Errors;
 use crate::lab::overrides;
+use crate::lab::scenes::Scene;
 use crate::lab::scenes::class::SceneClass;
 use crate::lab::scenes::holds::{Broken, Mark};
 use crate::lab::scenes::tolerance::{Accuracy, Tolerances};
@@ -126,6 +127,36 @@ pub struct Later {
 }
 
 impl Record {
+    /// The record of a run of `scene` that has measured nothing yet.
+    pub fn of(scene: &Scene, tolerances: Tolerances, settings: &Settings) -> Self {
+        let Settings { solver, order, budget, impacts, frozen, .. } = *settings;
+        Record {
+            scene: scene.name.clone(),
+            bodies: scene.bodies.len(),
+            class: SceneClass::default(),
+            dt: scene.dt,
+            solver: solver.name,
+            order,
+            lanes: settings.width.lanes(),
+            budget,
+            budget_text: budget::whole(&budget, solver, (impacts, frozen), &settings.parameters),
+            impacts,
+            frozen,
+            parameters: overrides::words(solver, &settings.parameters),
+            swept: None,
+            sample: None,
+            speed_up: None,
+            errors: None,
+            truth: None,
+            tolerances,
+            broken: None,
+            unchecked: Vec::new(),
+            later: None,
+            bits_equal: None,
+            failure: None,
+        }
+    }
+
     /// Key that all widths of one setting of a scene share.
     pub fn setting(&self) -> impl PartialEq {
         let chosen = (self.budget, self.order, self.impacts, self.frozen, self.parameters.as_str());

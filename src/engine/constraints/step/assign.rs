@@ -1,7 +1,7 @@
 //! Assignment of constraints to lanes: by colors, or one after the other.
 
 use super::Workspace;
-use crate::coloring::{Coloring, EXEMPT};
+use crate::coloring::{Coloring, EXEMPT, OVERFLOW};
 use crate::constraints::records::batches::Place;
 use crate::constraints::records::features::{Features, Layout, PartnerKind};
 use crate::constraints::records::graph::{Graph, UNSUPPORTED};
@@ -145,6 +145,23 @@ impl Assignment {
         };
         let allowed = LaneWidth::ALL.into_iter().rev().filter(|w| (narrowest..=widest).contains(w));
         allowed.min_by_key(|&w| cost(w)).unwrap_or(widest)
+    }
+
+    /// Color of each of `contacts` contacts, numbered in solving order; `None` for those without a color. Valid after
+    /// [`Self::colored`].
+    pub fn contact_colors(&self, contacts: usize) -> Vec<Option<u16>> {
+        let mut colors = vec![None; contacts];
+        let mut first = 0;
+        for Group { entries, coloring, .. } in &self.groups {
+            for (entry, &color) in entries.iter().zip(coloring.color_of()) {
+                let place = colors.get_mut(entry.index as usize).filter(|_| entry.kind == 0);
+                place
+                    .into_iter()
+                    .for_each(|place| *place = (color != OVERFLOW).then(|| first + u16::from(color)));
+            }
+            first += coloring.colors() as u16;
+        }
+        colors
     }
 
     /// Assigns contacts one after the other, ordered by a hash of their shapes.
