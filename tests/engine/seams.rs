@@ -4,7 +4,7 @@ use simpulse::engine::bodies::{BodyDef, ShapeDef};
 use simpulse::engine::solvers::find;
 use simpulse::engine::world::{Settings, World};
 
-const SOLVERS: [&str; 6] = ["soft_step", "soft_block", "pgs", "tgs_ngs", "xpbd", "direct"];
+const SOLVERS: [&str; 6] = ["soft_step", "shim", "pgs", "tgs_ngs", "xpbd", "direct"];
 
 /// Turns a vector by `angle` (rad).
 fn turned([x, y]: [f64; 2], angle: f64) -> [f64; 2] {

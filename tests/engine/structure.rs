@@ -49,12 +49,12 @@ const LAB: &[&[&str]] = &[
     &["files", "interned", "memory", "overrides", "parallel", "units"],
     &["reference"],
     &["metrics"],
-    &["scenes", "capture", "picture"],
+    &["scenes", "capture", "picture", "pokes"],
     &["trial"],
     &["recording", "chart"],
     &["verify", "study", "converge"],
     &["report"],
-    &["ablate", "profile", "compare", "torture"],
+    &["ablate", "profile", "compare", "torture", "view"],
 ];
 
 #[test]

@@ -1,7 +1,7 @@
 //! Serialization of a world: the state at the start of a step, without values that the step recomputes.
 //!
-//! Not saved: constraints of the caller's own types (a world with any is an error), and the piles and jams of `shim` and
-//! `soft_block`. All other solvers continue bit-identically.
+//! Not saved: constraints of the caller's own types (a world with any is an error), and the chains and jams of `shim`.
+//! All other solvers continue bit-identically.
 
 use super::edit::{Slots, StandingForces};
 use super::events::Events;

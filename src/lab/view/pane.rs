@@ -3,7 +3,7 @@
 use crate::engine::constraints::Impacts;
 use crate::engine::narrowphase::frozen::Freezing;
 use crate::engine::params::Budget;
-use crate::engine::world::{Settings, World};
+use crate::engine::world::{Settings, StepError, World};
 use crate::lab::error::Error;
 use crate::lab::metrics::{Errors, Observation};
 use crate::lab::pokes::Pokes;
@@ -98,9 +98,13 @@ impl Pane {
         if measured.is_some() {
             self.meter = None;
         }
-        if let Err(divergence) = self.world.step() {
-            self.failure = Some(divergence.into());
-            return Ok(());
+        match self.world.step() {
+            Ok(()) => {}
+            Err(StepError::Settings(error)) => return Err(error.into()),
+            Err(StepError::Diverged(divergence)) => {
+                self.failure = Some(divergence.into());
+                return Ok(());
+            }
         }
         if let Some(single) = &mut single {
             single.observe(&self.world);

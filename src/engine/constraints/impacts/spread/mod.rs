@@ -38,13 +38,17 @@
 //! themselves use these arms and frames: an impulse with an effect that its row leaves out may add energy,
 //! and has shot bodies out of piles.
 //!
+//! # Joints
+//!
+//! Where bodies with joints are hit, the rigid rows and limits of their joints are part of the problem ([`whole`]).
+//!
 //! # A bound for each island
 //!
-//! Bodies connected by contacts form an island. Islands are solved independently, so a scene behaves the same
+//! Bodies connected by contacts or joints form an island. Islands are solved independently, so a scene behaves the same
 //! next to another one. An island has at most 32 waves, of which the last 4 only stop, and a visit limit that
 //! grows with its number of points ([`VISITS`]). The solver stops points that still approach after that.
-//! Bodies of such an island that would end deeper in another body than they began are not moved. So the time
-//! of a step is bounded.
+//! Bodies of an island that reached its limit, or was solved as a whole, are not moved if they would end deeper in another
+//! body than they began. So the time of a step is bounded.
 
 mod find;
 mod law;
@@ -86,7 +90,7 @@ pub(crate) const VISITS: usize = 18;
 /// Number of points to which [`VISITS`] applies.
 const FIRST: usize = 8;
 
-/// How much deeper a point of an island that reached its bound may end, as a fraction of the slop (1): the
+/// How much deeper a point of such an island may end, as a fraction of the slop (1): the
 /// residual approach of touching bodies makes them overlap.
 const DEEPER: f32 = 0.1;
 
@@ -211,7 +215,7 @@ impl ImpactPropagation {
                 on.rows[row as usize].delta[..3].fill(0.0);
             }
         }
-        if on.timed && !is_done {
+        if on.timed && (!is_done || self.solutions > 0) {
             self.stay(on);
         }
         is_done

@@ -386,8 +386,8 @@ impl ImpactPropagation {
         self.enqueue(row);
     }
 
-    /// Whether points still approach, or bodies that move on given paths have thrown others faster than twice their own speed:
-    /// bodies without room.
+    /// Whether points still approach, or bodies are thrown faster than twice the speed of those that hit them, by others that
+    /// move on given paths or without restitution: bodies without room.
     fn is_squeezed(&self, on: &PropagationInput<'_>, places: &[usize], part: f32) -> bool {
         let length = |[x, y]: [f32; 2]| x.mul_add(x, y * y).sqrt();
         let of = |row: u32| on.rows[row as usize].velocity;
@@ -402,7 +402,8 @@ impl ImpactPropagation {
         }
         let after =
             self.pushed.iter().fold(0.0_f32, |most, &(row, _)| most.max(length([of(row)[0], of(row)[1]])));
-        approach > STILL_CLOSES * self.fastest || driver > 0.0 && after > 2.0 * before.max(driver)
+        let may_throw = driver > 0.0 || places.iter().all(|&place| self.points[place].role == Role::Stops);
+        approach > STILL_CLOSES * self.fastest || may_throw && after > 2.0 * before.max(driver)
     }
 
     /// Whether the impulses of the island have done work on its bodies, more than forces do in a step: N and T at the
