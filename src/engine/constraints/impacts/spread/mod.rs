@@ -38,17 +38,19 @@
 //! themselves use these arms and frames: an impulse with an effect that its row leaves out may add energy,
 //! and has shot bodies out of piles.
 //!
+//! Bodies that would end deeper in another body than they began are not moved.
+//!
 //! # Joints
 //!
-//! Where bodies with joints are hit, the rigid rows and limits of their joints are part of the problem ([`whole`]).
+//! Where bodies with joints are hit, the rigid rows and limits of their joints are part of the problem ([`whole`]). Welded bodies
+//! bounce, but are not stopped: sweeps know the masses that the planks of a beam lend to their contacts, impacts do not.
 //!
 //! # A bound for each island
 //!
 //! Bodies connected by contacts or joints form an island. Islands are solved independently, so a scene behaves the same
 //! next to another one. An island has at most 32 waves, of which the last 4 only stop, and a visit limit that
 //! grows with its number of points ([`VISITS`]). The solver stops points that still approach after that.
-//! Bodies of an island that reached its limit, or was solved as a whole, are not moved if they would end deeper in another
-//! body than they began. So the time of a step is bounded.
+//! So the time of a step is bounded.
 
 mod find;
 mod law;
@@ -90,7 +92,7 @@ pub(crate) const VISITS: usize = 18;
 /// Number of points to which [`VISITS`] applies.
 const FIRST: usize = 8;
 
-/// How much deeper a point of such an island may end, as a fraction of the slop (1): the
+/// How much deeper a point may end, as a fraction of the slop (1): the
 /// residual approach of touching bodies makes them overlap.
 const DEEPER: f32 = 0.1;
 
@@ -215,13 +217,13 @@ impl ImpactPropagation {
                 on.rows[row as usize].delta[..3].fill(0.0);
             }
         }
-        if on.timed && (!is_done || self.solutions > 0) {
+        if on.timed {
             self.stay(on);
         }
         is_done
     }
 
-    /// Cancels the displacement of bodies that have a point, visited or not, that would end deeper.
+    /// Cancels the displacement of bodies that have a point, visited or not, that would end deeper. A point that has bounced leaves.
     fn stay(&mut self, on: &mut PropagationInput<'_>) {
         let deeper = DEEPER * on.slop;
         for i in 0..self.pushed.len() {
@@ -232,7 +234,8 @@ impl ImpactPropagation {
             }
         }
         let mut stay: Vec<u32> = vec![];
-        for point in self.points[self.first..].iter().filter(|point| point.exists) {
+        let bounced = |point: &HitPoint| matches!(point.role, Role::Left | Role::Bounces);
+        for point in self.points[self.first..].iter().filter(|point| point.exists && !bounced(point)) {
             if point.gap(on.rows) < point.separation.min(0.0) - deeper {
                 stay.extend(point.moved());
             }
@@ -389,6 +392,9 @@ impl ImpactPropagation {
         }
         let mut touch = None;
         if matches!(point.role, Role::Open | Role::Left) {
+            if !self.joints.act() && point.rows.iter().any(|&row| self.joints.is_welded(row)) {
+                return false;
+            }
             let Some(mut time) = arrival(point, on, self.slowest) else { return false };
             if bounces && will_bounce(point, on) {
                 // In the next wave.

@@ -69,6 +69,8 @@ pub(super) struct WaveJoints {
     listed: Vec<u32>,
     /// Their rigid rows and limits, with the impulses of the impact.
     blocks: Vec<RowBlock>,
+    /// Whether a weld holds a body. `[rows]`, or empty
+    welded: Vec<bool>,
     /// Whether a body with joints was hit.
     act: bool,
 }
@@ -76,7 +78,7 @@ pub(super) struct WaveJoints {
 impl WaveJoints {
     /// Lists the joints of each body.
     pub fn link(&mut self, types: &[ConstraintSet], rows: &[BodyRow]) {
-        let WaveJoints { first, next, places, ends, is_listed, listed, .. } = self;
+        let WaveJoints { first, next, places, ends, is_listed, listed, welded, .. } = self;
         [&mut *first, &mut *next, &mut *listed].into_iter().for_each(Vec::clear);
         places.clear();
         ends.clear();
@@ -85,11 +87,14 @@ impl WaveJoints {
             return;
         }
         first.resize(rows.len(), NONE);
+        welded.clear();
+        welded.resize(rows.len(), false);
         for (t, joined) in types.iter().enumerate() {
             for (i, &pair) in joined.kind.ends().iter().enumerate() {
                 places.push([t as u32, i as u32]);
                 ends.push(pair);
                 for body in pair {
+                    welded[body as usize] |= joined.kind.rigid_size() == 3;
                     let end = next.len() as u32;
                     let moves = rows[body as usize].velocity[3] > 0.0;
                     next.push(if moves { std::mem::replace(&mut first[body as usize], end) } else { NONE });
@@ -115,6 +120,11 @@ impl WaveJoints {
     /// Whether a body that impulses move has joints.
     pub fn has(&self, row: u32) -> bool {
         self.first.get(row as usize).is_some_and(|&end| end != NONE)
+    }
+
+    /// Whether a weld holds a body that impulses move.
+    pub fn is_welded(&self, row: u32) -> bool {
+        self.has(row) && self.welded[row as usize]
     }
 
     /// Notes that a body with joints was hit.
