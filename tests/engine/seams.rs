@@ -103,7 +103,7 @@ fn shapes_go_round_corners() {
         let hill = BodyDef::fixed([0.0; 2]).with(line([-9.0, 0.0], [-1.5, 0.0], 0.0));
         let hill = hill.with(line([-1.5, 0.0], [4.0, -0.275], 0.0));
         for slider in &sliders()[..2] {
-            let [least, rise, end] = slide(solver, &[hill.clone()], slider, 0.0, 90);
+            let [least, rise, end] = slide(solver, std::slice::from_ref(&hill), slider, 0.0, 90);
             assert!(least > 0.98 && rise < 1e-3 && end > 1.2, "{solver}: {least} m/s, {rise} m, {end} m/s");
         }
         let slope: f64 = 0.3;

@@ -99,7 +99,7 @@ pub static SOLVER: Variant = Variant {
             trials: &[],
         },
     ],
-    kept: StateSize { per_point: PER_POINT, per_body: PER_BODY, ..StateSize::NONE },
+    kept: StateSize { per_point: PER_POINT, per_body: PER_BODY },
     exceptions: &[
         (Guarantee::Momentum, "bodies are moved one at a time and meet only in the limit"),
         (Guarantee::Converges, "the law that it solves is one of positions"),
