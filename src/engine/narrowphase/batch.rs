@@ -6,8 +6,6 @@ use super::frozen::{self, Found, FreezeLimits};
 use super::hull::HullRow;
 use super::hull_circle::HullCircle;
 use super::hulls::Hulls;
-use super::jobs::{CONTACT, JobLists, LISTS};
-pub use super::jobs::{Jobs, NO_CONTACT};
 use super::lanes::{Class, PoseRow, Poses, ShapePair, ShapeRow, Touch};
 use super::rectangles;
 use crate::contacts::{Contact, quad};
@@ -136,6 +134,52 @@ impl Shapes {
     }
 }
 
+/// Pairs of one kind, one entry each in every list.
+#[derive(Clone, Debug, Default)]
+pub struct Jobs {
+    /// The caller's index of the pair.
+    pub name: Vec<u32>,
+    /// Bodies of a and b.
+    pub bodies: [Vec<u32>; 2],
+    /// Numbers of shapes a and b ([`Shapes::push`]).
+    pub shapes: [Vec<u32>; 2],
+    /// The contact that stores the manifold, or [`NO_CONTACT`].
+    pub contact: Vec<u32>,
+}
+
+/// Index of a pair without a contact.
+pub const NO_CONTACT: u32 = u32::MAX;
+
+impl Jobs {
+    /// Replaces the jobs by those of `pairs` that `job` keeps. `job` returns whether to keep a pair, and its
+    /// bodies, shapes and contact.
+    ///
+    /// Every pair is written after the last kept one, whether kept or not, which avoids a branch.
+    #[inline(always)]
+    pub fn list(&mut self, pairs: &[u32], mut job: impl FnMut(u32) -> (bool, [u32; 2], [u32; 2], u32)) {
+        let Jobs { name, bodies: [a, b], shapes: [c, d], contact } = self;
+        let mut lists = [name, a, b, c, d, contact];
+        let mut kept = 0;
+        {
+            let [name, a, b, c, d, contact] = lists.each_mut().map(|list| {
+                list.resize(pairs.len(), 0);
+                &mut list[..pairs.len()]
+            });
+            for &pair in pairs {
+                let (keep, bodies, shapes, of_pair) = job(pair);
+                name[kept] = pair;
+                [a[kept], b[kept]] = bodies;
+                [c[kept], d[kept]] = shapes;
+                contact[kept] = of_pair;
+                kept += usize::from(keep);
+            }
+        }
+        for list in lists {
+            list.truncate(kept);
+        }
+    }
+}
+
 /// Inputs of the kernels besides the jobs.
 #[derive(Clone, Copy)]
 pub struct Input<'a> {
@@ -207,13 +251,21 @@ pub fn update(
         #[cfg(not(any(target_feature = "avx512f", feature = "emulated")))]
         LaneWidth::W16 => unreachable!("widths are limited to those of the build"),
     };
-    let lists = [a, b, c, d, IndexList::new(&jobs.name), IndexList::new(&jobs.contact)];
-    let lists = JobLists { lists, touching: jobs.touching.min(count) };
+    let lists = JobLists([a, b, c, d, IndexList::new(&jobs.name), IndexList::new(&jobs.contact)]);
     let points = run(lists, input, Room { contacts, found, made }, change);
     contacts.truncate(made);
     found.truncate(made);
     points
 }
+
+/// The lists of [`Jobs`]: bodies and shapes of a and b, with a checked bound, names, and contacts.
+#[derive(Clone, Copy)]
+pub(super) struct JobLists<'a>(pub [IndexList<'a>; LISTS]);
+
+/// Lists of [`Jobs`].
+const LISTS: usize = 6;
+/// The last of [`JobLists`].
+pub(super) const CONTACT: usize = LISTS - 1;
 
 /// Where kernels write their results.
 struct Room<'a> {
@@ -312,7 +364,7 @@ fn run<L: Lanes, const KIND: usize>(lists: JobLists, input: Input, room: Room, c
 /// found them in the given list, at the given places. Radii are written if `has_radii`.
 #[inline(always)]
 fn run_kernel<L: Lanes>(
-    JobLists { lists, touching }: JobLists,
+    lists: JobLists,
     Room { contacts, found, made }: Room,
     freezing: Option<(FreezeLimits, &[PoseRow])>,
     has_radii: bool,
@@ -320,7 +372,7 @@ fn run_kernel<L: Lanes>(
     mut kernel: impl FnMut([LaneIndex<L::Index>; 4], &mut [Found], LaneIndex<L::Index>) -> (Touch<L>, [L; 2]),
 ) -> usize {
     let (mut points, mut next) = (0_u32, 0);
-    let count = lists[CONTACT].entries().len();
+    let count = lists.0[CONTACT].entries().len();
     let (mut picked, mut waiting) = ([PickedIndices::default(); LISTS], 0);
     loop {
         if let Some((limits, poses)) = freezing {
@@ -328,11 +380,7 @@ fn run_kernel<L: Lanes>(
             while waiting < L::WIDTH && next < count {
                 let first = next;
                 next = (first + L::WIDTH).min(count);
-                let kept = if first < touching {
-                    frozen::follow::<L>(&lists, first..next, poses, limits, (contacts, found))
-                } else {
-                    [0.0; MOST_LANES]
-                };
+                let kept = frozen::follow::<L>(lists, first..next, poses, limits, (contacts, found));
                 let mut places = [0; MOST_LANES];
                 let before = waiting;
                 for (place, kept) in places.iter_mut().zip(&kept[..next - first]) {
@@ -344,7 +392,7 @@ fn run_kernel<L: Lanes>(
                     let places = &places[..next - first];
                     picked
                         .iter_mut()
-                        .zip(lists)
+                        .zip(lists.0)
                         .for_each(|(picked, l)| picked.place(places, l.part(first..next)));
                 }
             }
@@ -362,7 +410,7 @@ fn run_kernel<L: Lanes>(
             let [a, b, c, d, name, contact] = &picked;
             ([a, b, c, d].map(|list| list.batch()), name.entries(), &contact.entries()[..filled])
         } else {
-            let [a, b, c, d, name, contact] = &lists;
+            let [a, b, c, d, name, contact] = &lists.0;
             let [room_a, room_b, room_c, room_d] = rooms;
             let indices = [
                 a.batch_at(next, room_a),

@@ -40,12 +40,10 @@
 //! normal and arms by zero.
 
 use super::Margins;
-use super::jobs::{LISTS, NO_CONTACT};
+use super::batch::{JobLists, NO_CONTACT};
 use super::lanes::{PoseRow, Poses, Touch, abs, rotate, unrotate};
 use crate::contacts::{Contact, quad};
-use crate::lanes::{
-    IndexList, LaneIndex, Lanes, MOST_LANES, Quad, align_frame, prefetch_quad, prefetch_records,
-};
+use crate::lanes::{LaneIndex, Lanes, MOST_LANES, Quad, align_frame, prefetch_quad, prefetch_records};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 
@@ -191,7 +189,7 @@ impl<L: Lanes> Turns<L> {
 /// last one, which never stays frozen.
 #[inline(never)]
 pub(super) fn follow<L: Lanes>(
-    lists: &[IndexList; LISTS],
+    lists: JobLists,
     batch: Range<usize>,
     poses: &[PoseRow],
     limits: FreezeLimits,
@@ -204,7 +202,7 @@ pub(super) fn follow<L: Lanes>(
         (bytemuck::cast_slice_mut(contacts), bytemuck::cast_slice(found));
     let none = (found.len() / STRIDE - 1) as u32;
     let contact_of = |&i: &u32| if i == NO_CONTACT { none } else { i };
-    let [a, b, .., all] = *lists;
+    let [a, b, .., all] = lists.0;
     let coming = batch.end..(batch.end + L::WIDTH).min(all.entries().len());
     for i in all.entries()[coming].iter().map(contact_of) {
         prefetch_quad::<STRIDE, PLACE>(found, i);

@@ -22,7 +22,6 @@ pub mod gjk;
 pub mod hull;
 pub mod hull_circle;
 pub mod hulls;
-pub mod jobs;
 pub mod lanes;
 pub mod rectangles;
 pub mod seams;
