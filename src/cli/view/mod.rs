@@ -1,7 +1,7 @@
 //! `simpulse view`: a page on this machine that shows up to four solvers on one scene, side by side and in step.
 //!
-//! Three kinds of threads: the main one steps the [`Session`]; [`server`] accepts connections and answers requests, a
-//! short thread each; the one [`socket`] that is open has a reader, which passes requests on, and a writer. A frame is
+//! Three kinds of threads: the main one steps the [`Session`]; `server` accepts connections and answers requests, a
+//! short thread each; the one `socket` that is open has a reader, which passes requests on, and a writer. A frame is
 //! made only when the page is ready for one, and holds the newest state, so a slow page sees fewer frames and delays
 //! nothing.
 

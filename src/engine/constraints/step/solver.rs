@@ -31,7 +31,7 @@ pub trait Solver: CloneSolver + fmt::Debug + Send {
     /// All passes of one step.
     fn step(&mut self, passes: &mut Passes<'_>);
 
-    /// Numbers that it keeps from step to step besides [`SolverState`], for saved worlds.
+    /// Numbers that it keeps from step to step besides [`SolverState`](crate::constraints::records::kept::SolverState), for saved worlds.
     fn kept(&self) -> Vec<f64> {
         Vec::new()
     }
