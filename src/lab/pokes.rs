@@ -17,8 +17,14 @@ const SPEED: [f64; 2] = [0.03, 0.1];
 const PAUSE: [f64; 2] = [0.1, 0.5];
 /// Greatest distance of a push from the center of mass, as a fraction of the body's reach (1).
 const OFF_CENTER: f64 = 0.5;
-/// Gravity that determines the speed of pushes in scenes without any (m/s²).
+/// Gravity for what a player does in scenes without any (m/s²).
 const STANDARD_GRAVITY: f64 = 10.0;
+
+/// Gravity that determines how strong a player is (m/s²): that of the world, or the standard one where there is none.
+pub(crate) fn gravity(world: &World) -> f64 {
+    let [x, y] = world.settings.gravity.map(f64::from);
+    Some(x.hypot(y)).filter(|gravity| *gravity > 0.0).unwrap_or(STANDARD_GRAVITY)
+}
 
 /// The pushes of a run.
 #[derive(Clone, Debug)]
@@ -39,11 +45,10 @@ impl Pokes {
     /// Pushes on the dynamic bodies that `world` has now, before steps up to `end`.
     pub fn new(seed: u64, world: &World, end: u64) -> Self {
         let reaches = reaches(world).into_iter().enumerate();
-        let [x, y] = world.settings.gravity.map(f64::from);
         let mut pokes = Pokes {
             random: Pcg64Mcg::seed_from_u64(seed),
             bodies: reaches.filter(|&(i, _)| world.bodies.is_dynamic(i)).collect(),
-            gravity: Some(x.hypot(y)).filter(|g| *g > 0.0).unwrap_or(STANDARD_GRAVITY),
+            gravity: gravity(world),
             dt: f64::from(world.settings.dt),
             next: world.step_index,
             end,

@@ -2,7 +2,7 @@
 // the newest step as bytes, see src/lab/view/frame.rs; the page sends requests (src/lab/view/request.rs), and
 // `shown` for every frame, after which it is sent another one.
 (() => {
-  const { si, clamp, theme } = drawing;
+  const { si, theme } = drawing;
   const get = (id) => document.getElementById(id);
   const element = (tag, attributes, parent) => {
     const made = Object.assign(document.createElement(tag), attributes);
@@ -325,15 +325,11 @@
   }
 
   // The pointer on a picture: pull, drop, throw, cut, or move the picture.
-  let ball = null, grabs = 0;
+  let ball = null;
   const hand = () => document.querySelector("#hands input:checked").value;
-  function place(canvas, e) {
-    const scale = drawing.scaleOf(all, view, canvas.clientWidth, canvas.clientHeight), { box } = all;
-    return [0.5 * (box[0] + box[2]) + view.x + (e.offsetX - 0.5 * canvas.clientWidth) / scale,
-      0.5 * (box[1] + box[3]) + view.y - (e.offsetY - 0.5 * (canvas.clientHeight - drawing.STRIP)) / scale];
-  }
+  const placement = (canvas) => drawing.placement(canvas, all, view);
+  const place = (canvas, e) => drawing.toScene(placement(canvas), [e.offsetX, e.offsetY]);
   function pointer(canvas, k) {
-    const scale = () => drawing.scaleOf(all, view, canvas.clientWidth, canvas.clientHeight);
     canvas.addEventListener("pointerdown", (e) => {
       if (!all) return;
       try { canvas.setPointerCapture(e.pointerId); } catch { /* a pointer of a script */ }
@@ -344,7 +340,7 @@
       }
       if (hand() === "box") send({ do: "drop", at });
       if (hand() === "ball") ball = { pane: k, from: at, to: at };
-      if (hand() === "cut") send({ do: "cut", pane: k, at, reach: 12 / scale() });
+      if (hand() === "cut") send({ do: "cut", pane: k, at, reach: 12 / placement(canvas).scale });
     });
     canvas.addEventListener("pointermove", (e) => {
       if (!e.buttons || !all) return;
@@ -354,8 +350,7 @@
       } else if (asked && asked.held !== false) {
         send({ do: "move", at: place(canvas, e) });
       } else if (hand() === "drag") {
-        view.x -= e.movementX / scale();
-        view.y += e.movementY / scale();
+        drawing.pan(canvas, all, view, e);
         draw(page.state);
       }
     });
@@ -369,21 +364,14 @@
     canvas.addEventListener("pointercancel", end);
     canvas.addEventListener("wheel", (e) => {
       if (!all) return;
-      e.preventDefault();
-      const [x, y] = [e.offsetX - 0.5 * canvas.clientWidth, 0.5 * (canvas.clientHeight - drawing.STRIP) - e.offsetY];
-      const old = scale();
-      view.zoom = clamp(view.zoom * Math.exp(-0.0015 * e.deltaY), 0.02, 1e5);
-      view.x += x / old - x / scale();
-      view.y += y / old - y / scale();
+      drawing.zoom(canvas, all, view, e);
       draw(page.state);
     }, { passive: false });
   }
 
   // The arrow of a throw.
   function aim(canvas) {
-    const c = canvas.getContext("2d"), scale = drawing.scaleOf(all, view, canvas.clientWidth, canvas.clientHeight), { box } = all;
-    const to = ([x, y]) => [0.5 * canvas.clientWidth + scale * (x - view.x - 0.5 * (box[0] + box[2])),
-      0.5 * (canvas.clientHeight - drawing.STRIP) - scale * (y - view.y - 0.5 * (box[1] + box[3]))];
+    const c = canvas.getContext("2d"), to = (at) => drawing.toCanvas(placement(canvas), at);
     c.strokeStyle = theme().force;
     c.lineWidth = 2;
     drawing.stroke(c, to(ball.from), to(ball.to));
@@ -420,10 +408,7 @@
   drawing.isDark.addEventListener("change", () => draw(page.state));
 
   // For tests: the last frame, and how it is drawn.
-  const page = { state: null, stage: null, all: null, view, send, downloads: 0, place: (at, k = 0) => {
-    const { picture } = panes[k], scale = drawing.scaleOf(all, view, picture.clientWidth, picture.clientHeight), { box } = all;
-    return [0.5 * picture.clientWidth + scale * (at[0] - view.x - 0.5 * (box[0] + box[2])),
-      0.5 * (picture.clientHeight - drawing.STRIP) - scale * (at[1] - view.y - 0.5 * (box[1] + box[3]))];
-  } };
+  const page = { state: null, stage: null, all: null, view, send, downloads: 0,
+    place: (at, k = 0) => drawing.toCanvas(placement(panes[k].picture), at) };
   window.page = page;
 })();

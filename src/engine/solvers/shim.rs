@@ -122,13 +122,11 @@ struct Shim {
     rolls: bool,
 }
 
-/// Standard number of substeps.
-const STANDARD: u32 = 14;
-
-/// Visit limit for each of the first points of an island that is hit. With it, no step takes four times as
-/// long as others. The work of a step outside its substeps takes as long as eight substeps.
+/// Visit limit for each of the first points of an island that is hit. With fewer substeps than the standard it is lower, so
+/// that an impact takes the same part of the time of a step: the work outside substeps takes as long as eight of them.
 fn visits(substeps: u32) -> usize {
-    VISITS * (substeps.min(STANDARD) + 8) as usize / (STANDARD + 8) as usize
+    let standard = SOLVER.budget.substeps;
+    VISITS * (substeps.min(standard) + 8) as usize / (standard + 8) as usize
 }
 
 impl Solver for Shim {

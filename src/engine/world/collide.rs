@@ -116,7 +116,7 @@ impl World {
             } else {
                 let Contact { manifold, radii, .. } = *contact;
                 let contact = Contact { manifold, radii, ..candidate.without_manifold() };
-                if !self.seams.is_empty() && is_ghost(&contact) {
+                if is_ghost(&contact) {
                     ghost_points += manifold.count as usize;
                     return;
                 }

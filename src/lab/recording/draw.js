@@ -107,21 +107,42 @@ const drawing = (() => {
 
   // Below the scene, for the bar of a round length.
   const STRIP = 30;
-  // Pixels per meter on a canvas of this size.
-  const scaleOf = ({ box }, { zoom }, w, h) =>
-    0.86 * zoom * Math.min(w / Math.max(box[2] - box[0], 1e-9), (h - STRIP) / Math.max(box[3] - box[1], 1e-9));
+  // Where a scene is on a canvas: pixels per meter, and the place of the scene's origin (pixels).
+  function placement(canvas, { box }, { zoom, x, y }) {
+    const w = canvas.clientWidth, h = canvas.clientHeight;
+    const scale = 0.86 * zoom * Math.min(w / Math.max(box[2] - box[0], 1e-9), (h - STRIP) / Math.max(box[3] - box[1], 1e-9));
+    const left = 0.5 * w - scale * (0.5 * (box[0] + box[2]) + x), top = 0.5 * (h - STRIP) + scale * (0.5 * (box[1] + box[3]) + y);
+    return { scale, left, top, w, h };
+  }
+  // From the scene to the canvas, and back.
+  const toCanvas = ({ scale, left, top }, [x, y]) => [left + scale * x, top - scale * y];
+  const toScene = ({ scale, left, top }, [x, y]) => [(x - left) / scale, (top - y) / scale];
+
+  // Moves the picture with a pointer.
+  function pan(canvas, all, view, e) {
+    const { scale } = placement(canvas, all, view);
+    view.x -= e.movementX / scale;
+    view.y += e.movementY / scale;
+  }
+
+  // Zooms by a wheel; what is under the pointer stays there.
+  function zoom(canvas, all, view, e) {
+    e.preventDefault();
+    const at = [e.offsetX, e.offsetY], [x, y] = toScene(placement(canvas, all, view), at);
+    view.zoom = clamp(view.zoom * Math.exp(-0.0015 * e.deltaY), 0.02, 1e5);
+    const [u, v] = toScene(placement(canvas, all, view), at);
+    view.x += x - u;
+    view.y += y - v;
+  }
 
   // A frame of a run. `all` are the measures; `view` has `zoom`, `x` and `y` (m, from the middle of the box),
   // and what is shown: `forces`, `depths`, `joints`.
   function scene(canvas, run, frame, all, view) {
     const [c, w, h] = clear(canvas);
     if (!(w > 0)) return;
-    const { ink, paper } = theme(), { box } = all;
-    const scale = scaleOf(all, view, w, h);
-    const cx = 0.5 * (box[0] + box[2]) + view.x, cy = 0.5 * (box[1] + box[3]) + view.y;
-    const left = 0.5 * w - scale * cx, top = 0.5 * (h - STRIP) + scale * cy;
-    const to = ([x, y]) => [left + scale * x, top - scale * y];
-    shapes(c, run, frame, all, view, { scale, left, top, w, h });
+    const { ink, paper } = theme(), place = placement(canvas, all, view), { scale } = place;
+    const to = (at) => toCanvas(place, at);
+    shapes(c, run, frame, all, view, place);
     if (view.joints) joints(c, run, frame, all, scale, to);
     if (view.forces || view.colors) points(c, frame, all, view, scale, to);
     // A bar of a round length.
@@ -335,5 +356,5 @@ const drawing = (() => {
     c.textAlign = "left";
   }
 
-  return { isDark, theme, si, clear, clamp, stroke, strip, label, measures, scaleOf, scene, STRIP };
+  return { isDark, theme, si, clear, clamp, stroke, strip, label, measures, placement, toCanvas, toScene, pan, zoom, scene };
 })();

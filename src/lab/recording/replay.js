@@ -144,22 +144,14 @@
       if (act && e.target.tagName !== "BUTTON") { act(); e.preventDefault(); }
     });
     for (const { scene, curves } of panels) {
-      const scale = () => drawing.scaleOf(all, state, scene.clientWidth, scene.clientHeight);
       scene.addEventListener("wheel", (e) => {
-        e.preventDefault();
-        const [x, y] = [e.offsetX - 0.5 * scene.clientWidth, 0.5 * (scene.clientHeight - drawing.STRIP) - e.offsetY];
-        const old = scale();
-        state.zoom = clamp(state.zoom * Math.exp(-0.0015 * e.deltaY), 0.02, 1e5);
-        // What is under the pointer stays there.
-        state.x += x / old - x / scale();
-        state.y += y / old - y / scale();
+        drawing.zoom(scene, all, state, e);
         draw();
       }, { passive: false });
       scene.addEventListener("pointerdown", (e) => scene.setPointerCapture(e.pointerId));
       scene.addEventListener("pointermove", (e) => {
         if (!e.buttons) return;
-        state.x -= e.movementX / scale();
-        state.y += e.movementY / scale();
+        drawing.pan(scene, all, state, e);
         draw();
       });
       curves.addEventListener("pointerdown", (e) => {

@@ -11,6 +11,7 @@ use crate::engine::bodies::{BodyDef, ShapeDef};
 use crate::engine::world::World;
 use crate::lab::error::Error;
 use crate::lab::picture::joints;
+use crate::lab::pokes::gravity;
 use crate::lab::scenes::tolerance;
 use glam::DVec2;
 use std::f64::consts::TAU;
@@ -21,8 +22,6 @@ const HERTZ: f64 = 4.0;
 const STIFFEST: f64 = 0.5;
 /// Greatest force, as a multiple of the body's weight (1).
 const STRONGEST: f64 = 100.0;
-/// Gravity for [`STRONGEST`] in scenes without any (m/s²).
-const STANDARD_GRAVITY: f64 = 10.0;
 /// Largest coordinate and speed of what a player adds (m, m/s).
 const FARTHEST: f64 = 1e5;
 
@@ -151,9 +150,7 @@ impl Pane {
         let velocity = b.velocity(i).as_dvec2() + f64::from(b.angular_velocity[i]) * arm.perp();
         let omega = (TAU * HERTZ).min(STIFFEST / f64::from(s.dt));
         let pull = (omega * omega * offset - 2.0 * omega * velocity) / inverse;
-        let gravity = DVec2::from(s.gravity.map(f64::from)).length();
-        let gravity = if gravity > 0.0 { gravity } else { STANDARD_GRAVITY };
-        let force = pull.clamp_length_max(STRONGEST * gravity / f64::from(b.inv_mass[i]));
+        let force = pull.clamp_length_max(STRONGEST * gravity(&self.world) / f64::from(b.inv_mass[i]));
         let world = self.touch();
         world.apply_force(body, force.as_vec2().to_array())?;
         world.apply_torque(body, arm.perp_dot(force) as f32)?;

@@ -5,6 +5,7 @@
 //! velocity sweeps in any order, Jacobi sweeps, split masses, position sweeps.
 
 pub mod chains;
+pub(crate) mod graph;
 pub(crate) mod passes;
 pub mod rows;
 

@@ -95,8 +95,15 @@ impl<L: Lanes, P: JointPass<L> + DerefMut> JointPass<L> for Besides<L, P> {
     }
 
     #[inline(always)]
-    fn free_row(&mut self, j: Jacobian<L>, error: L, law: RowLaw<L>, kept: &mut [L], ease: L) {
-        self.of.free_row(j, error, law, kept, ease);
+    fn free<const N: usize>(
+        &mut self,
+        j: [Jacobian<L>; N],
+        error: [L; N],
+        law: RowLaw<L>,
+        kept: &mut [L],
+        ease: L,
+    ) {
+        self.of.free(j, error, law, kept, ease);
     }
 }
 
@@ -118,19 +125,11 @@ pub(super) struct VelocityRule {
 impl<L: Lanes> JointPass<L> for Velocities<L> {
     #[inline(always)]
     fn block<const N: usize>(&mut self, j: [Jacobian<L>; N], error: [L; N], law: RowLaw<L>, kept: &mut [L]) {
-        self.solve(j, error, law, kept, L::splat(1.0));
+        self.free(j, error, law, kept, L::splat(1.0));
     }
 
     #[inline(always)]
-    fn free_row(&mut self, j: Jacobian<L>, error: L, law: RowLaw<L>, kept: &mut [L], ease: L) {
-        self.solve([j], [error], law, kept, ease);
-    }
-}
-
-impl<L: Lanes> Velocities<L> {
-    /// Solves a block with the response K/`ease`.
-    #[inline(always)]
-    fn solve<const N: usize>(
+    fn free<const N: usize>(
         &mut self,
         j: [Jacobian<L>; N],
         error: [L; N],
@@ -234,19 +233,11 @@ pub(super) enum DisplacementRule {
 impl<L: Lanes> JointPass<L> for Displacements<L> {
     #[inline(always)]
     fn block<const N: usize>(&mut self, j: [Jacobian<L>; N], error: [L; N], law: RowLaw<L>, kept: &mut [L]) {
-        self.solve(j, error, law, kept, L::splat(1.0));
+        self.free(j, error, law, kept, L::splat(1.0));
     }
 
     #[inline(always)]
-    fn free_row(&mut self, j: Jacobian<L>, error: L, law: RowLaw<L>, kept: &mut [L], ease: L) {
-        self.solve([j], [error], law, kept, ease);
-    }
-}
-
-impl<L: Lanes> Displacements<L> {
-    /// Solves a block with the response K/`ease`.
-    #[inline(always)]
-    fn solve<const N: usize>(
+    fn free<const N: usize>(
         &mut self,
         j: [Jacobian<L>; N],
         error: [L; N],

@@ -89,18 +89,31 @@ pub trait JointPass<L: Lanes>: Deref<Target = JointPair<L>> {
         self.block([j], [error], law, kept);
     }
 
-    /// A row along a coordinate that other, rigid rows of the joint leave free. `ease` is K/K_f, see
+    /// A block along coordinates that other, rigid rows of the joint leave free. `ease` is K/K_f, see
     /// [`JointPair::ease`]. Sweeps solve it with K_f, so that it and the rigid rows converge in two sweeps; where only the
     /// law counts, a spring of K has S and D of that factor.
     #[inline(always)]
-    fn free_row(&mut self, j: Jacobian<L>, error: L, law: RowLaw<L>, kept: &mut [L], ease: L) {
+    fn free<const N: usize>(
+        &mut self,
+        j: [Jacobian<L>; N],
+        error: [L; N],
+        law: RowLaw<L>,
+        kept: &mut [L],
+        ease: L,
+    ) {
         let law = match law {
             RowLaw::Spring { stiffness, damping, cap } => {
                 RowLaw::Spring { stiffness: stiffness * ease, damping: damping * ease, cap }
             }
             other => other,
         };
-        self.block([j], [error], law, kept);
+        self.block(j, error, law, kept);
+    }
+
+    /// One row of [`Self::free`].
+    #[inline(always)]
+    fn free_row(&mut self, j: Jacobian<L>, error: L, law: RowLaw<L>, kept: &mut [L], ease: L) {
+        self.free([j], [error], law, kept, ease);
     }
 }
 

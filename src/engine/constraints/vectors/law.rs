@@ -16,8 +16,6 @@ const SHIFT: f64 = 1e-7;
 const PIVOTS: usize = 10;
 /// Solves of a linear problem: one, and two refinements on the residual.
 const PASSES: usize = 3;
-/// Residual, relative to the largest impulse, at which the law is solved.
-pub(crate) const TOLERANCE: f64 = 1e-10;
 
 /// State of a row in a linear problem.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -312,10 +310,10 @@ impl IslandLaw {
         contacts + self.joint_states(arguments).map(joint).sum::<f64>()
     }
 
-    /// The merit at which residuals are mere rounding errors of these impulses.
-    pub fn goal(&self, impulses: &[f64]) -> f64 {
+    /// The merit at which residuals are this fraction of the impulses.
+    pub fn goal(&self, impulses: &[f64], tolerance: f64) -> f64 {
         let one = |(i, l): (usize, &f64)| self.diagonal(i) * l * l;
-        TOLERANCE * TOLERANCE * impulses.iter().enumerate().map(one).sum::<f64>()
+        tolerance * tolerance * impulses.iter().enumerate().map(one).sum::<f64>()
     }
 
     /// States of all rows.

@@ -1,10 +1,12 @@
 //! Newton's method on the contact law of an island, see [`super::law`].
 
-use super::law::{IslandLaw, TOLERANCE};
+use super::law::IslandLaw;
 use crate::constraints::numerics::block_lu::BlockLu;
 use crate::lanes::BodyRow;
 use std::ops::Range;
 
+/// Residual at which the law is solved, as a fraction of the impulses (1): rounding.
+const TOLERANCE: f64 = 1e-10;
 /// Most halvings of a Newton step.
 const HALVINGS: usize = 8;
 /// Sweeps in `f64` that replace a Newton step without improvement.
@@ -59,7 +61,7 @@ impl Island {
     /// One step that reduces the residual, if there is one: Newton's, or sweeps, or Lemke's method in small
     /// islands. Returns whether it improved.
     pub fn step(&mut self) -> bool {
-        self.done |= self.merit <= self.law.goal(&self.impulses);
+        self.done |= self.is_solved(TOLERANCE);
         if self.done {
             return false;
         }
@@ -70,17 +72,20 @@ impl Island {
         found
     }
 
-    /// At most this many Newton steps, or sweeps where these do not improve. Returns whether the residual is below this fraction of the impulses.
+    /// At most this many Newton steps, or sweeps where these do not improve. Returns whether the residual is below this
+    /// fraction of the impulses.
     pub fn solve(&mut self, steps: usize, tolerance: f64) -> bool {
-        let is_below = |island: &Self, part: f64| {
-            island.merit <= (part / TOLERANCE).powi(2) * island.law.goal(&island.impulses)
-        };
         for _ in 0..steps {
-            if is_below(self, 1e-3 * tolerance) || !(self.search() || self.sweep()) {
+            if self.is_solved(1e-3 * tolerance) || !(self.search() || self.sweep()) {
                 break;
             }
         }
-        is_below(self, tolerance)
+        self.is_solved(tolerance)
+    }
+
+    /// Whether the residual is below this fraction of the impulses.
+    fn is_solved(&self, tolerance: f64) -> bool {
+        self.merit <= self.law.goal(&self.impulses, tolerance)
     }
 
     /// A Newton step, halved until the residual falls.

@@ -53,6 +53,7 @@
 //! So the time of a step is bounded.
 
 mod find;
+mod joints;
 mod law;
 mod pair;
 mod point;
@@ -61,11 +62,11 @@ mod whole;
 use crate::constraints::impacts::touch::Round;
 use crate::disjoint::DisjointSets;
 pub(crate) use find::{Find, impact_speeds};
+use joints::WaveJoints;
 use law::{lossy_impulses, rough_impulses};
 pub(crate) use point::PropagationInput;
 use point::{Body, HitPoint, Role, STILL};
 use std::collections::VecDeque;
-use whole::WaveJoints;
 
 /// No lane, no point.
 const NONE: u32 = u32::MAX;
@@ -392,7 +393,7 @@ impl ImpactPropagation {
         }
         let mut touch = None;
         if matches!(point.role, Role::Open | Role::Left) {
-            if !self.joints.act() && point.rows.iter().any(|&row| self.joints.is_welded(row)) {
+            if !self.joints.act() && point.rows.iter().any(|&row| self.joints.is_welded(on.types, row)) {
                 return false;
             }
             let Some(mut time) = arrival(point, on, self.slowest) else { return false };
@@ -461,22 +462,22 @@ impl ImpactPropagation {
     /// Applies an impulse (N·s) to both bodies of a point and queues them. The impulse acts until `time` (s),
     /// and at `at` (s) on average.
     fn push(&mut self, on: &mut PropagationInput<'_>, place: usize, impulse: [f32; 2], [at, time]: [f32; 2]) {
-        let point = &self.points[place];
-        for (row, is_pushed) in point.rows.into_iter().zip([point.pushes_a, true]) {
-            if !is_pushed {
-                continue;
-            }
+        let HitPoint { rows, pushes_a, .. } = self.points[place];
+        for row in rows.into_iter().skip(usize::from(!pushes_a)) {
+            self.note_push(on, row);
             let body = &mut self.bodies[row as usize];
-            if !std::mem::replace(&mut body.is_pushed, true) {
-                let [x, y, spin, _] = on.rows[row as usize].velocity;
-                self.pushed.push((row, [x, y, spin]));
-            }
             body.time = body.time.max(time);
-            if !std::mem::replace(&mut body.is_queued, true) {
-                self.queue.push_back(row);
-            }
         }
-        point.push(on.rows, impulse, if on.timed { at } else { 0.0 });
+        self.points[place].push(on.rows, impulse, if on.timed { at } else { 0.0 });
+    }
+
+    /// Notes that a body is pushed, with its velocity before that, and queues it.
+    fn note_push(&mut self, on: &PropagationInput<'_>, row: u32) {
+        if !std::mem::replace(&mut self.bodies[row as usize].is_pushed, true) {
+            let [x, y, spin, _] = on.rows[row as usize].velocity;
+            self.pushed.push((row, [x, y, spin]));
+        }
+        enqueue(&mut self.bodies, &mut self.queue, row);
     }
 
     /// Links the ends of each body, and joins bodies in contact into islands.
@@ -534,6 +535,13 @@ impl ImpactPropagation {
                 points[1].exists && points[0].coupling(&points[1], on.rows).powi(2) > 0.5 * k_0 * k_1;
         }
         *listed as usize
+    }
+}
+
+/// Queues a body whose points are to be visited.
+fn enqueue(bodies: &mut [Body], queue: &mut VecDeque<u32>, row: u32) {
+    if !std::mem::replace(&mut bodies[row as usize].is_queued, true) {
+        queue.push_back(row);
     }
 }
 

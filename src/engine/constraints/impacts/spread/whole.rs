@@ -17,11 +17,10 @@
 //! **Bound.** [`LARGEST`] points and pairs of joint rows, and [`SOLUTIONS`] for an island.
 
 use super::point::{HitPoint, PropagationInput, Role, STILL};
-use super::{BOUNCES, ImpactPropagation, NONE};
-use crate::constraints::kernels::types::{BodyStates, ConstraintSet};
+use super::{BOUNCES, ImpactPropagation, NONE, enqueue};
+use crate::constraints::kernels::types::BodyStates;
 use crate::constraints::kernels::velocity::rules::Softness;
 use crate::constraints::numerics::cone;
-use crate::constraints::records::rows::{RowBlock, RowLaw};
 use crate::constraints::vectors::law::IslandLaw;
 use crate::constraints::vectors::newton::Island;
 use crate::constraints::vectors::system::PointRows;
@@ -51,92 +50,6 @@ const STILL_CLOSES: f32 = 0.01;
 
 /// Parts of the rebounds that are tried.
 const PARTS: [f32; 3] = [1.0, 0.5, 0.0];
-
-/// The joints of an island.
-#[derive(Clone, Debug, Default)]
-pub(super) struct WaveJoints {
-    /// The first end of each body that impulses move; joint j has the ends 2 j and 2 j + 1. Empty without joints. `[rows]`
-    first: Vec<u32>,
-    /// The next end of the same body. `[2 joints]`
-    next: Vec<u32>,
-    /// Type of each joint, and its index in the type. `[joints]`
-    places: Vec<[u32; 2]>,
-    /// The bodies of each joint. `[joints]`
-    ends: Vec<[u32; 2]>,
-    /// Whether a joint is in `listed`. `[joints]`
-    is_listed: Vec<bool>,
-    /// Joints that take part.
-    listed: Vec<u32>,
-    /// Their rigid rows and limits, with the impulses of the impact.
-    blocks: Vec<RowBlock>,
-    /// Whether a weld holds a body. `[rows]`, or empty
-    welded: Vec<bool>,
-    /// Whether a body with joints was hit.
-    act: bool,
-}
-
-impl WaveJoints {
-    /// Lists the joints of each body.
-    pub fn link(&mut self, types: &[ConstraintSet], rows: &[BodyRow]) {
-        let WaveJoints { first, next, places, ends, is_listed, listed, welded, .. } = self;
-        [&mut *first, &mut *next, &mut *listed].into_iter().for_each(Vec::clear);
-        places.clear();
-        ends.clear();
-        is_listed.clear();
-        if types.is_empty() {
-            return;
-        }
-        first.resize(rows.len(), NONE);
-        welded.clear();
-        welded.resize(rows.len(), false);
-        for (t, joined) in types.iter().enumerate() {
-            for (i, &pair) in joined.kind.ends().iter().enumerate() {
-                places.push([t as u32, i as u32]);
-                ends.push(pair);
-                for body in pair {
-                    welded[body as usize] |= joined.kind.rigid_size() == 3;
-                    let end = next.len() as u32;
-                    let moves = rows[body as usize].velocity[3] > 0.0;
-                    next.push(if moves { std::mem::replace(&mut first[body as usize], end) } else { NONE });
-                }
-            }
-        }
-        is_listed.resize(places.len(), false);
-    }
-
-    /// Begins an island.
-    pub fn clear(&mut self) {
-        self.listed.iter().for_each(|&joint| self.is_listed[joint as usize] = false);
-        self.listed.clear();
-        self.blocks.clear();
-        self.act = false;
-    }
-
-    /// The bodies of each joint. `[joints]`
-    pub fn ends(&self) -> &[[u32; 2]] {
-        &self.ends
-    }
-
-    /// Whether a body that impulses move has joints.
-    pub fn has(&self, row: u32) -> bool {
-        self.first.get(row as usize).is_some_and(|&end| end != NONE)
-    }
-
-    /// Whether a weld holds a body that impulses move.
-    pub fn is_welded(&self, row: u32) -> bool {
-        self.has(row) && self.welded[row as usize]
-    }
-
-    /// Notes that a body with joints was hit.
-    pub fn join(&mut self) {
-        self.act = true;
-    }
-
-    /// Whether a body with joints was hit in this island.
-    pub fn act(&self) -> bool {
-        self.act
-    }
-}
 
 impl ImpactPropagation {
     /// Solves the wave at once, the first one from the velocities before it. If it is too large or has no solution, returns false
@@ -176,9 +89,7 @@ impl ImpactPropagation {
 
     /// Solves the wave, and again with what its bodies then approach. Returns whether nothing is left to add.
     fn rounds(&mut self, on: &mut PropagationInput<'_>, is_first: bool, bounces: bool) -> bool {
-        for row in 0..self.pushed.len() {
-            self.enqueue(self.pushed[row].0);
-        }
+        self.pushed.iter().for_each(|&(row, _)| enqueue(&mut self.bodies, &mut self.queue, row));
         for place in self.first..self.points.len() {
             if takes_part(&self.points[place]) {
                 self.enqueue_ends(place);
@@ -199,17 +110,10 @@ impl ImpactPropagation {
         }
     }
 
-    /// Queues a body whose points and joints are to be looked at.
-    fn enqueue(&mut self, row: u32) {
-        if !std::mem::replace(&mut self.bodies[row as usize].is_queued, true) {
-            self.queue.push_back(row);
-        }
-    }
-
     /// Queues the bodies of a point that impulses move.
     fn enqueue_ends(&mut self, place: usize) {
-        let point = self.points[place];
-        point.moved().iter().for_each(|&row| self.enqueue(row));
+        let ImpactPropagation { points, bodies, queue, .. } = self;
+        points[place].moved().iter().for_each(|&row| enqueue(bodies, queue, row));
     }
 
     /// Adds what the queued bodies touch, and empties the queue.
@@ -221,7 +125,9 @@ impl ImpactPropagation {
                 if self.points.len() - self.first + self.joints.blocks.len() > 4 * LARGEST {
                     continue;
                 }
-                self.add_joints(on, row);
+                let ImpactPropagation { joints, bodies, queue, .. } = self;
+                let states = BodyStates { rows: on.rows, poses: on.poses };
+                joints.add(row, on.types, states, |row| enqueue(bodies, queue, row));
                 let mut end = self.bodies[row as usize].first;
                 while end != NONE {
                     let first = self.list(on, end / 2);
@@ -260,29 +166,7 @@ impl ImpactPropagation {
         rests
     }
 
-    /// Adds the joints of a body, and queues the bodies at their other ends.
-    fn add_joints(&mut self, on: &mut PropagationInput<'_>, row: u32) {
-        let mut end = self.joints.first.get(row as usize).copied().unwrap_or(NONE);
-        while end != NONE {
-            let joint = end / 2;
-            end = self.joints.next[end as usize];
-            if std::mem::replace(&mut self.joints.is_listed[joint as usize], true) {
-                continue;
-            }
-            self.joints.listed.push(joint);
-            let [t, i] = self.joints.places[joint as usize];
-            let (states, from) = (BodyStates { rows: on.rows, poses: on.poses }, self.joints.blocks.len());
-            on.types[t as usize].kind.collect(i as usize, states, &mut self.joints.blocks);
-            let mut added = self.joints.blocks.split_off(from);
-            added.retain(|block| matches!(block.law, RowLaw::Rigid | RowLaw::Limit));
-            added.iter_mut().for_each(|block| block.impulses.fill(0.0));
-            self.joints.blocks.append(&mut added);
-            let moved = self.joints.ends[joint as usize].into_iter().filter(|&row| self.joints.has(row));
-            moved.collect::<Vec<_>>().into_iter().for_each(|row| self.enqueue(row));
-        }
-    }
-
-    /// Solves the problem of all points and joints that take part. Returns false, and undoes the impact, if it creates energy.
+    /// Solves the problem of all points and joints that take part. Returns whether the solution may be taken.
     fn solve(&mut self, on: &mut PropagationInput<'_>, is_first: bool) -> bool {
         let places: Vec<usize> =
             (self.first..self.points.len()).filter(|&place| takes_part(&self.points[place])).collect();
@@ -299,20 +183,17 @@ impl ImpactPropagation {
             places.iter().for_each(|&place| self.meet(on, place));
         }
         for part in PARTS {
-            let of = |i: usize| &self.points[places[i]];
-            let all = 0..places.len();
-            let rows = all.clone().map(|i| point_rows(of(i), i)).collect();
-            let impulses: Vec<_> = all.clone().map(|i| of(i).impulse).collect();
-            let velocities: Vec<_> = all
-                .clone()
-                .map(|i| {
-                    let ([vn, vt], point) = (of(i).velocity(on.rows), of(i));
-                    let gap =
-                        if timed || point.role == Role::Bounces { 0.0 } else { point.gap(on.rows).max(0.0) };
-                    [part.mul_add(-point.target, vn) + gap / on.dt, vt]
-                })
-                .collect();
-            let surfaces: Vec<_> = all.clone().map(|i| [of(i).separation, of(i).friction]).collect();
+            let hit: Vec<HitPoint> = places.iter().map(|&place| self.points[place]).collect();
+            let rows = hit.iter().enumerate().map(|(at, point)| point_rows(point, at)).collect();
+            let impulses: Vec<_> = hit.iter().map(|point| point.impulse).collect();
+            let velocity = |point: &HitPoint| {
+                let [vn, vt] = point.velocity(on.rows);
+                let closes = !timed && point.role == Role::Stops;
+                let gap = if closes { point.gap(on.rows).max(0.0) } else { 0.0 };
+                [part.mul_add(-point.target, vn) + gap / on.dt, vt]
+            };
+            let velocities: Vec<_> = hit.iter().map(velocity).collect();
+            let surfaces: Vec<_> = hit.iter().map(|point| [point.separation, point.friction]).collect();
             let mut law = IslandLaw::new(rows, on.rows, &impulses, &velocities, &surfaces);
             for block in &self.joints.blocks {
                 law.join(on.rows, block, Softness::RIGID, on.dt);
@@ -329,8 +210,11 @@ impl ImpactPropagation {
             }
             let mut first = 2 * places.len();
             for b in 0..self.joints.blocks.len() {
-                let [a, b_] = self.joints.blocks[b].bodies;
-                [a, b_].into_iter().for_each(|row| self.note_push(on, row));
+                for row in self.joints.blocks[b].bodies {
+                    if self.joints.has(row) {
+                        self.note_push(on, row);
+                    }
+                }
                 let block = &mut self.joints.blocks[b];
                 island.push(first..first + block.size, &mut block.impulses, on.rows);
                 first += block.size;
@@ -343,10 +227,7 @@ impl ImpactPropagation {
                 }
             }
             if !self.gains_energy(on) {
-                if self.is_squeezed(on, &places, part) {
-                    break;
-                }
-                return true;
+                return !self.is_squeezed(on, &places, part);
             }
         }
         false
@@ -382,18 +263,6 @@ impl ImpactPropagation {
         for &place in places {
             points[place].time = is_hit(place).unwrap_or(-on.dt);
         }
-    }
-
-    /// Notes that a joint pushes a body.
-    fn note_push(&mut self, on: &PropagationInput<'_>, row: u32) {
-        if !self.joints.has(row) {
-            return;
-        }
-        if !std::mem::replace(&mut self.bodies[row as usize].is_pushed, true) {
-            let [x, y, spin, _] = on.rows[row as usize].velocity;
-            self.pushed.push((row, [x, y, spin]));
-        }
-        self.enqueue(row);
     }
 
     /// Whether points still approach, or bodies are thrown faster than twice the speed of those that hit them, by others that

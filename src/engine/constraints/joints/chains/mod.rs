@@ -72,6 +72,7 @@
 pub(super) mod records;
 mod system;
 
+use super::graph::{JointGraph, NONE};
 use crate::constraints::kernels::types::ConstraintSet;
 use crate::constraints::kernels::velocity::masses::ScaledMasses;
 use crate::constraints::records::links::{ChainLink, LinkRule};
@@ -79,9 +80,6 @@ use crate::lanes::BodyRow;
 use crate::narrowphase::lanes::PoseRow;
 pub use system::ChainStage;
 use system::ChainSystem;
-
-/// No body.
-const NONE: u32 = u32::MAX;
 
 /// Chains of joints, and the memory to solve them.
 #[derive(Clone, Debug, Default)]
@@ -104,14 +102,8 @@ pub struct Chains {
 /// Memory to find chains.
 #[derive(Clone, Debug, Default)]
 struct ChainSearch {
-    /// Where joints of a body begin in `joined`. `[bodies + 1]`
-    starts: Vec<u32>,
-    /// Joints by body.
-    joined: Vec<u32>,
-    /// Type of each joint, and its index in the type.
-    places: Vec<[u32; 2]>,
-    /// Ends of each joint; [`NONE`] for a body that does not move.
-    ends: Vec<[u32; 2]>,
+    /// Joints with rigid rows.
+    graph: JointGraph,
     /// Links of all chains, one after the other: joint, body R (away from where the chain hangs), and number
     /// of the chain.
     found: Vec<(u32, u32, usize)>,
@@ -130,7 +122,8 @@ impl Chains {
         self.moves.extend(rows.iter().map(moves_by_impulses));
         self.ends.clear();
         self.ends.extend(types.iter().flat_map(|t| t.kind.ends()));
-        self.search.list(types, &self.moves);
+        let moves = |body: u32| self.moves[body as usize];
+        self.search.graph.list(types, |kind| kind.rigid_size() > 0, self.moves.len(), moves);
         self.search.find();
         self.lay_out(types);
         self.system.note(rows);
@@ -139,7 +132,7 @@ impl Chains {
     /// Assigns links to slots of the system.
     fn lay_out(&mut self, types: &[ConstraintSet]) {
         let Chains { links, system, search, .. } = self;
-        let type_of = |joint: u32| &types[search.places[joint as usize][0] as usize].kind;
+        let type_of = |joint: u32| &types[search.graph.place(joint)[0] as usize].kind;
         let size = search.found.iter().map(|&(joint, ..)| type_of(joint).rigid_size()).max().unwrap_or(0);
         links.clear();
         links.resize(types.len(), vec![]);
@@ -147,9 +140,9 @@ impl Chains {
         system.begin(search.found.len(), size);
         let mut bodies = vec![inert; system.slots()];
         for (i, &(joint, right, _)) in search.found.iter().enumerate() {
-            let [t, number] = search.places[joint as usize];
+            let [t, number] = search.graph.place(joint);
             let slot = system.slot(i);
-            let forward = search.ends[joint as usize][1] == right;
+            let forward = search.graph.ends()[joint as usize][1] == right;
             if right != NONE {
                 bodies[slot] = right;
             }
@@ -265,17 +258,12 @@ fn moves_by_impulses(row: &BodyRow) -> bool {
 }
 
 impl ChainSearch {
-    fn joints_of(&self, body: u32) -> &[u32] {
-        let [from, to] = [self.starts[body as usize], self.starts[body as usize + 1]].map(|i| i as usize);
-        &self.joined[from..to]
-    }
-
     /// Finds all chains, each from a joint to an immovable body.
     fn find(&mut self) {
         self.found.clear();
         let mut chains = 0;
-        for joint in 0..self.ends.len() as u32 {
-            let [a, b] = self.ends[joint as usize];
+        for joint in 0..self.graph.len() as u32 {
+            let [a, b] = self.graph.ends()[joint as usize];
             // A chain that hangs at both ends is found from the joint with the lower number.
             if (a == NONE) != (b == NONE) {
                 let from = self.found.len();
@@ -298,44 +286,14 @@ impl ChainSearch {
             if body == NONE {
                 return Some(joint);
             }
-            joint = match *self.joints_of(body) {
+            joint = match *self.graph.of(body) {
                 [_] => return Some(first),
                 // The other joint.
                 [one, other] => one ^ other ^ joint,
                 _ => return None,
             };
-            let [a, b] = self.ends[joint as usize];
+            let [a, b] = self.graph.ends()[joint as usize];
             body = if a == body { b } else { a };
-        }
-    }
-
-    /// Lists the joints of each body.
-    fn list(&mut self, types: &[ConstraintSet], moves: &[bool]) {
-        let ChainSearch { starts, joined, places, ends, .. } = self;
-        places.clear();
-        ends.clear();
-        starts.clear();
-        starts.resize(moves.len() + 1, 0);
-        for (t, joined) in types.iter().enumerate().filter(|(_, joined)| joined.kind.rigid_size() > 0) {
-            for (i, pair) in joined.kind.ends().iter().enumerate() {
-                let pair = pair.map(|body| if moves[body as usize] { body } else { NONE });
-                places.push([t as u32, i as u32]);
-                ends.push(pair);
-                pair.iter().filter(|&&body| body != NONE).for_each(|&body| starts[body as usize + 1] += 1);
-            }
-        }
-        for body in 0..moves.len() {
-            starts[body + 1] += starts[body];
-        }
-        joined.clear();
-        joined.resize(starts[moves.len()] as usize, 0);
-        // Filled backward: the last place of each body that is filled is its start.
-        let mut next: Vec<u32> = starts[1..].to_vec();
-        for (joint, pair) in ends.iter().enumerate().rev() {
-            for &body in pair.iter().filter(|&&body| body != NONE) {
-                next[body as usize] -= 1;
-                joined[next[body as usize] as usize] = joint as u32;
-            }
         }
     }
 }
