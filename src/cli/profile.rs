@@ -46,6 +46,9 @@ pub struct ProfileArgs {
     /// Lanes
     #[command(flatten)]
     pub lanes: LaneArgs,
+    /// Threads that share each step
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = values::threads())]
+    pub threads: usize,
     /// Steps before the state is measured
     #[arg(long, default_value_t = 60, value_name = "STEPS")]
     pub settle: u32,
@@ -72,7 +75,8 @@ pub fn run(args: &ProfileArgs) -> Result<ExitCode, Error> {
         let message = format!("is {}, must be above 0 and at most {MAX_SECONDS}", args.seconds);
         return Err(Error::invalid("seconds", message));
     }
-    let settings = args.setting.settings()?.exactly(args.lanes.or_native());
+    let settings =
+        Settings { threads: args.threads, ..args.setting.settings()?.exactly(args.lanes.or_native()) };
     let open = |name: &String| Ok(open_scene(name, args.seed, None, None)?.scene);
     let scenes = args.scenes.iter().map(open).collect::<Result<Vec<_>, Error>>()?;
     let mut reports = Vec::new();

@@ -59,6 +59,9 @@ pub struct RunArgs {
     /// Constraint order
     #[arg(long, default_value = "colored", value_name = "ORDER", value_parser = values::order())]
     pub order: Order,
+    /// Threads that share each step; every number gives the same bits
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = values::threads())]
+    pub threads: usize,
     /// Steps [default: those of the scene]
     #[arg(long, value_name = "N")]
     pub steps: Option<u32>,
@@ -233,7 +236,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
 
 /// The settings of a solver with the order and lanes of the command. Errors: natural order in lanes.
 pub(super) fn settings(args: &RunArgs, own: Settings) -> Result<Settings, Error> {
-    let own = Settings { continuous: args.continuous.unwrap_or(own.continuous), ..own };
+    let continuous = args.continuous.unwrap_or(own.continuous);
+    let own = Settings { continuous, threads: args.threads, ..own };
     let order = args.order;
     let own = match (order, args.lanes) {
         (Order::Colored, Some(width)) => own.exactly(width),

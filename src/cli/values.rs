@@ -5,6 +5,7 @@ use crate::engine::lanes::{LaneWidth, native_width, target_features};
 use crate::engine::narrowphase::frozen::{FreezeLimits, Freezing};
 use crate::engine::params::{Budget, Parameters, Without};
 use crate::engine::solvers::{DEFAULT, VARIANTS, Variant, find};
+use crate::engine::workers::MOST_THREADS;
 use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::overrides::{self, Override};
@@ -127,6 +128,11 @@ pub fn order() -> impl TypedValueParser<Value = Order> {
     PossibleValuesParser::new(names).map(|name| {
         Order::ALL.into_iter().find(|order| order.name() == name.as_str()).unwrap_or(Order::Colored)
     })
+}
+
+/// The parser of `--threads`.
+pub fn threads() -> impl TypedValueParser<Value = usize> {
+    clap::value_parser!(u64).range(1..=MOST_THREADS as u64).map(|threads| threads as usize)
 }
 
 /// The parser of `--impacts`.

@@ -40,6 +40,8 @@ pub mod narrowphase;
 pub mod params;
 pub mod shapes;
 pub mod solvers;
+#[doc(hidden)]
+pub mod workers;
 pub mod world;
 
 /// What tests, benches and the laboratory of this repository reach into: kernels and their inputs, the

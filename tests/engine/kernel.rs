@@ -10,7 +10,7 @@ use simpulse::engine::constraints::{
     Batches, Features, Kernel, Layout, NormalRule, PartnerKind, kernels::prepare, kernels::velocity::sweep,
 };
 use simpulse::engine::contacts::{Contact, Manifold, ManifoldPoint};
-use simpulse::engine::lanes::{BodyRow, Lanes};
+use simpulse::engine::lanes::{BodyRow, Lanes, Shared};
 
 const BODIES: usize = 24;
 const INV_H: f32 = 60.0;
@@ -96,10 +96,10 @@ fn batches(setup: &Setup, width: usize) -> Batches {
 fn in_lanes<L: Lanes>(setup: &Setup) -> (Vec<BodyRow>, Vec<[[f32; 2]; 2]>, Batches) {
     let mut rows = setup.rows.clone();
     let mut batches = batches(setup, L::WIDTH);
-    prepare::prepare::<L, Full>(&mut rows, &mut batches, &setup.contacts);
-    warm_start::<L, Full>(&mut rows, &mut batches);
+    prepare::prepare::<L, Full>(Shared::from(&mut rows[..]), &mut batches, &setup.contacts);
+    warm_start::<L, Full>(Shared::from(&mut rows[..]), &mut batches);
     for _ in 0..3 {
-        sweep::sweep::<L, Full, _>(&mut rows, &mut batches, Rigid { inv_h: INV_H });
+        sweep::sweep::<L, Full, _>(Shared::from(&mut rows[..]), &mut batches, Rigid { inv_h: INV_H });
     }
     let mut impulses = vec![[[0.0; 2]; 2]; setup.contacts.len()];
     batches.for_each_lane(&Features::FULL, |contact, layout, record, lane| {
@@ -166,8 +166,8 @@ fn an_eager_rule_cannot_move_padding() {
     let setup = Setup { rows, contacts };
     let mut rows = setup.rows.clone();
     let mut batches = batches(&setup, 8);
-    prepare::prepare::<wide::f32x8, Full>(&mut rows, &mut batches, &setup.contacts);
-    sweep::sweep::<wide::f32x8, Full, _>(&mut rows, &mut batches, Eager);
+    prepare::prepare::<wide::f32x8, Full>(Shared::from(&mut rows[..]), &mut batches, &setup.contacts);
+    sweep::sweep::<wide::f32x8, Full, _>(Shared::from(&mut rows[..]), &mut batches, Eager);
     assert_eq!(rows[2].velocity, [0.0, 7.0, 0.0, 1.0]);
     assert_eq!(rows[BODIES], BodyRow::default());
 }

@@ -12,6 +12,7 @@ use simpulse::engine::narrowphase::lanes::Class;
 use simpulse::engine::narrowphase::lanes::PoseRow;
 use simpulse::engine::narrowphase::{Margins, collide, collide_in_step};
 use simpulse::engine::shapes::{Pose, Shape};
+use simpulse::engine::workers::Workers;
 
 const SPECULATIVE: f32 = 0.1;
 
@@ -51,6 +52,7 @@ impl Scene {
             shapes: &self.rows,
             margins: Margins::within(SPECULATIVE),
             freezing: None,
+            workers: &Workers::default(),
         };
         let (mut changed, mut fresh) = (vec![], vec![]);
         let points = update(

@@ -16,7 +16,7 @@ use simpulse::engine::constraints::{
 };
 use simpulse::engine::contacts::{Contact, quad};
 use simpulse::engine::lanes::{
-    BodyRow, IndexList, Indices, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowStore, prefetch,
+    BodyRow, IndexList, Indices, LaneIndex, LaneWidth, Lanes, MOST_LANES, Quad, RowStore, Shared, prefetch,
     prefetch_records,
 };
 use simpulse::engine::narrowphase::Margins;
@@ -25,6 +25,7 @@ use simpulse::engine::narrowphase::hull::{Hull, HullRow};
 use simpulse::engine::narrowphase::lanes::{PoseRow, Poses, ShapeRow};
 use simpulse::engine::params::{Budget, Without};
 use simpulse::engine::shapes::Shape;
+use simpulse::engine::workers::Workers;
 use std::hint::black_box;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -130,13 +131,17 @@ type Pass = (&'static str, Reads, fn(&mut Given));
 fn passes<L: Lanes>() -> [Pass; 8] {
     use Reads::{Both, Bounces, Contacts, Rows};
     [
-        ("sweep", Rows, |g| sweep::<L, Full, _>(&mut g.rows, &mut g.batches, RULE)),
-        ("warm_start", Rows, |g| warm_start::<L, Full>(&mut g.rows, &mut g.batches)),
-        ("position_sweep", Rows, |g| position_sweep::<L, Full>(&mut g.rows, &mut g.batches, POSITION)),
+        ("sweep", Rows, |g| sweep::<L, Full, _>(Shared::from(&mut g.rows[..]), &mut g.batches, RULE)),
+        ("warm_start", Rows, |g| warm_start::<L, Full>(Shared::from(&mut g.rows[..]), &mut g.batches)),
+        ("position_sweep", Rows, |g| {
+            position_sweep::<L, Full>(Shared::from(&mut g.rows[..]), &mut g.batches, POSITION)
+        }),
         ("restitution::apply", Rows, |g| {
             restitution::apply::<L, Full>(&mut g.rows, &mut g.batches, &mut g.bounces);
         }),
-        ("prepare", Both, |g| prepare::prepare::<L, Full>(&mut g.rows, &mut g.batches, &g.contacts)),
+        ("prepare", Both, |g| {
+            prepare::prepare::<L, Full>(Shared::from(&mut g.rows[..]), &mut g.batches, &g.contacts)
+        }),
         ("restitution::prepare", Both, |g| g.prepare_bounces::<L>()),
         ("store", Contacts, |g| prepare::store::<L, Full>(&mut g.batches, &mut g.contacts)),
         ("restitution::track", Bounces, |g| {
@@ -237,8 +242,8 @@ fn wrong_width<L: Lanes>() {
 fn wrong_layout<L: Lanes>() {
     let words = "layout";
     let mut g = Given::new(good(L::WIDTH)).with_bounces::<L>();
-    panics(words, || sweep::<L, Bare, _>(&mut g.rows, &mut g.batches, RULE));
-    panics(words, || prepare::prepare::<L, Bare>(&mut g.rows, &mut g.batches, &g.contacts));
+    panics(words, || sweep::<L, Bare, _>(Shared::from(&mut g.rows[..]), &mut g.batches, RULE));
+    panics(words, || prepare::prepare::<L, Bare>(Shared::from(&mut g.rows[..]), &mut g.batches, &g.contacts));
     panics(words, || prepare::store::<L, Bare>(&mut g.batches, &mut g.contacts));
     panics(words, || restitution::track::<L, Bare>(&mut g.batches, &mut g.bounces));
     panics(words, || g.batches.for_each_lane(&Features::NONE, |_, _, _, _| {}));
@@ -252,7 +257,7 @@ fn wrong_layout<L: Lanes>() {
             batches.push_segment(PartnerKind::Dynamic, &layout, [(0, [0, 1])].into_iter(), 2);
         }));
         if pushed.is_ok() {
-            panics(words, || sweep::<L, Full, _>(&mut g.rows, &mut batches, RULE));
+            panics(words, || sweep::<L, Full, _>(Shared::from(&mut g.rows[..]), &mut batches, RULE));
         }
     }
 }
@@ -392,6 +397,7 @@ fn collide(kind: PairKind, width: LaneWidth, pairs: u32, contacts: usize, spoil:
         shapes: &shapes,
         margins: Margins::within(0.02),
         freezing: None,
+        workers: &Workers::default(),
     };
     let mut contacts = vec![Contact::default(); contacts];
     update(kind, width, &jobs, input, &mut contacts, &mut vec![], &mut |_, _, _| {});
@@ -483,8 +489,12 @@ fn unsafe_code_is_only_in_listed_files() {
     found.sort();
     let listed = [
         "benches/peers/src/box2d.rs",
+        "src/engine/constraints/kernels/stages.rs",
         "src/engine/lanes/quads.rs",
         "src/engine/lanes/rows.rs",
+        "src/engine/lanes/shared.rs",
+        "src/engine/narrowphase/batch.rs",
+        "src/engine/workers.rs",
         "tests/allocations.rs",
         "tests/lab/flush_to_zero.rs",
     ];

@@ -33,7 +33,8 @@ fn named_after<'t>(code: &'t str, prefix: &str) -> BTreeSet<&'t str> {
 
 /// Modules of a folder, from the lowest layer up. Modules of one layer do not import each other.
 const ENGINE: &[&[&str]] = &[
-    &["error", "params", "lanes"],
+    &["error", "params", "workers"],
+    &["lanes"],
     &["clock", "shapes", "contacts", "coloring", "disjoint"],
     &["bodies"],
     &["broadphase", "narrowphase"],

@@ -6,6 +6,7 @@ use simpulse::engine::bodies::{Bodies, BodyDef, BodyKind};
 use simpulse::engine::broadphase::{BroadPhase, BroadPhaseKind, FatBoxes, Proxy};
 use simpulse::engine::params::SPECULATIVE_DISTANCE;
 use simpulse::engine::shapes::{Aabb, MassProperties, Shape};
+use simpulse::engine::workers::Workers;
 
 fn boxed(min: [f32; 2], size: [f32; 2], body: u32) -> Proxy {
     let min = Vec2::from(min);
@@ -14,7 +15,7 @@ fn boxed(min: [f32; 2], size: [f32; 2], body: u32) -> Proxy {
 
 fn pairs_of(kind: BroadPhaseKind, proxies: &[Proxy]) -> Vec<[u32; 2]> {
     let mut out = vec![[7, 7]];
-    BroadPhase::new(kind).pairs(proxies, &mut out);
+    BroadPhase::new(kind).pairs(proxies, &mut out, &Workers::default());
     out
 }
 
@@ -219,7 +220,7 @@ proptest! {
             let mut broad_phase = BroadPhase::new(kind);
             let mut out = Vec::new();
             for proxies in &scenes {
-                broad_phase.pairs(proxies, &mut out);
+                broad_phase.pairs(proxies, &mut out, &Workers::default());
                 prop_assert_eq!(&out, &expected(proxies), "{:?}", kind);
             }
         }
@@ -243,7 +244,7 @@ proptest! {
                         proxy.dynamic ^= scale == 1;
                     }
                 }
-                broad_phase.pairs(&proxies, &mut out);
+                broad_phase.pairs(&proxies, &mut out, &Workers::default());
                 let defined = expected(&proxies);
                 prop_assert_eq!(&out, &defined, "{:?}", kind);
             }
@@ -262,7 +263,7 @@ proptest! {
         for kind in BroadPhaseKind::ALL {
             let mut broad_phase = BroadPhase::new(kind);
             let mut pairs = Vec::new();
-            broad_phase.pairs(&proxies, &mut pairs);
+            broad_phase.pairs(&proxies, &mut pairs, &Workers::default());
             for frame in &frames {
                 let mut moved = Vec::new();
                 for &(i, dx, dy, scale) in frame {
@@ -280,7 +281,7 @@ proptest! {
                     moved.push(proxies.len() as u32);
                     proxies.push(grown);
                 }
-                broad_phase.update(&proxies, &moved, &mut pairs);
+                broad_phase.update(&proxies, &moved, &mut pairs, &Workers::default());
                 let defined = expected(&proxies);
                 prop_assert_eq!(&pairs, &defined, "{:?}", kind);
             }
@@ -320,7 +321,8 @@ proptest! {
         for frame in moves.chunks(4) {
             for &(body, dx, dy, turn, scale) in frame {
                 let scale = 10f32.powi(scale);
-                bodies.advance(body, Vec2::new(dx, dy) * scale);
+                bodies.position_x[body] += dx * scale;
+                bodies.position_y[body] += dy * scale;
                 let angle = bodies.angle(body) + turn * scale;
                 (bodies.rotation_sin[body], bodies.rotation_cos[body]) = angle.sin_cos();
                 bodies.velocity_x[body] = 100.0 * dx * scale;

@@ -25,6 +25,7 @@ mod saved;
 mod scenes;
 mod solver2d;
 mod solver_rules;
+mod threads;
 mod truth;
 mod verify;
 mod view;

@@ -50,7 +50,8 @@ pub struct Bodies {
     pub position_x: LaneVec,
     /// Center of mass, y (m).
     pub position_y: LaneVec,
-    /// Low part of the position, x (m): x is `position_x + position_x_lo`. See [`Bodies::advance`].
+    /// Low part of the position, x (m): x is `position_x + position_x_lo`, so that steps far below its last digit
+    /// add up.
     pub position_x_lo: LaneVec,
     /// Low part of the position, y (m).
     pub position_y_lo: LaneVec,
@@ -91,6 +92,19 @@ pub struct Bodies {
     pub bullet: Vec<bool>,
     /// Whether a body consists of discs about its center of mass, so that rotating it moves no contact.
     pub(crate) round: Vec<bool>,
+}
+
+/// Adds `delta` to a coordinate.
+///
+/// An f32 position alone would not change if a step's motion is below half its last digit: 30 nm at 1 m, 4 mm at 100 km.
+/// So the rounding error of the sum is kept in the low part, by Knuth's two-sum, which is exact for any magnitudes.
+#[inline]
+pub(crate) fn add(sum: &mut f32, lo: &mut f32, delta: f32) {
+    let term = delta + *lo;
+    let new = *sum + term;
+    let virtual_term = new - *sum;
+    *lo = (*sum - (new - virtual_term)) + (term - virtual_term);
+    *sum = new;
 }
 
 impl Bodies {
@@ -194,24 +208,6 @@ impl Bodies {
             Pose { position: Vec2::ZERO, rotation: rotation(a) },
             Pose { position: Vec2::new(x, y), rotation: rotation(b) },
         ]
-    }
-
-    /// Moves body `i` by `delta` (m).
-    ///
-    /// An f32 position alone would not change if a step's motion is below half its last digit: 30 nm at 1 m,
-    /// 4 mm at 100 km. So the rounding error of the sum is kept in the low part, by Knuth's two-sum, which is
-    /// exact for any magnitudes.
-    #[inline]
-    pub fn advance(&mut self, i: usize, delta: Vec2) {
-        let add = |sum: &mut f32, lo: &mut f32, delta: f32| {
-            let term = delta + *lo;
-            let new = *sum + term;
-            let virtual_term = new - *sum;
-            *lo = (*sum - (new - virtual_term)) + (term - virtual_term);
-            *sum = new;
-        };
-        add(&mut self.position_x[i], &mut self.position_x_lo[i], delta.x);
-        add(&mut self.position_y[i], &mut self.position_y_lo[i], delta.y);
     }
 
     /// Velocity of the center of mass of body `i` (m/s).

@@ -19,6 +19,7 @@ pub use region::Region;
 pub use tree::Tree;
 
 use crate::shapes::Aabb;
+use crate::workers::Workers;
 
 /// A shape in the broad phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,19 +98,19 @@ impl BroadPhase {
     ///
     /// Proxies are identified by their index. Between calls, proxies may move and change, and may be added or
     /// removed at the end.
-    pub fn pairs(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>) {
+    pub fn pairs(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>, workers: &Workers) {
         match self {
             BroadPhase::HashGrid(grid) => grid.pairs(proxies, out),
-            BroadPhase::Tree(tree) => tree.pairs(proxies, out),
+            BroadPhase::Tree(tree) => tree.pairs(proxies, out, workers),
         }
     }
 
     /// Updates `pairs`, the result of the last call. Since then only the proxies in `moved` (ascending) may
     /// have changed. The result is that of [`BroadPhase::pairs`].
-    pub fn update(&mut self, proxies: &[Proxy], moved: &[u32], pairs: &mut Vec<[u32; 2]>) {
+    pub fn update(&mut self, proxies: &[Proxy], moved: &[u32], pairs: &mut Vec<[u32; 2]>, workers: &Workers) {
         match self {
-            BroadPhase::Tree(tree) => tree.update(proxies, moved, pairs),
-            _ => self.pairs(proxies, pairs),
+            BroadPhase::Tree(tree) => tree.update(proxies, moved, pairs, workers),
+            _ => self.pairs(proxies, pairs, workers),
         }
     }
 }

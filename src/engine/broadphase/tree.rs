@@ -26,6 +26,8 @@ use super::Proxy;
 use super::curve::{BITS, hilbert};
 use super::node::{BITS_OF_FAN, FAN, Node};
 use super::sort::PairSort;
+use crate::workers::Workers;
+use std::ops::Range;
 use wide::f32x16;
 
 /// The order is rebuilt when the sum of the leaves' perimeters has grown by this factor.
@@ -33,6 +35,10 @@ const REBUILD_THRESHOLD: f32 = 1.15;
 
 /// Pair lists are updated incrementally if at most one proxy in `FEW` moved.
 const FEW: usize = 16;
+
+/// Least number of leaves, and of proxies that moved, that are worth a thread.
+const LEAST_LEAVES: usize = 16;
+const LEAST_MOVED: usize = 64;
 
 /// Finds candidate pairs. Keeps its state between calls.
 #[derive(Clone, Debug, Default)]
@@ -49,32 +55,38 @@ pub struct Tree {
     keys: Vec<u64>,
     /// Whether a proxy moved in this call, `[proxies]`.
     moved: Vec<bool>,
-    /// Pairs in the order found, if many proxies moved; only a prefix is used.
-    found: Vec<[u32; 2]>,
     sort: PairSort,
-    /// Pairs in the order found, if few proxies moved.
-    fresh: Vec<[u32; 2]>,
     merged: Vec<[u32; 2]>,
+    /// The search of each thread.
+    searches: Vec<Search>,
+}
+
+/// Memory of a search.
+#[derive(Clone, Debug, Default)]
+struct Search {
+    /// Pairs in the order found; the first `len` are in use.
+    found: Vec<[u32; 2]>,
+    len: usize,
     /// Stack of levels and nodes to visit.
     stack: Vec<[u32; 2]>,
 }
 
 impl Tree {
     /// See [`super::BroadPhase::pairs`].
-    pub fn pairs(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>) {
+    pub fn pairs(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>, workers: &Workers) {
         if !self.has_order(proxies) {
             self.make_order(proxies);
         } else {
             self.fill(proxies);
             self.renew_order(proxies);
         }
-        self.find_all(proxies, out);
+        self.find_all(proxies, out, workers);
     }
 
     /// See [`super::BroadPhase::update`].
-    pub fn update(&mut self, proxies: &[Proxy], moved: &[u32], pairs: &mut Vec<[u32; 2]>) {
+    pub fn update(&mut self, proxies: &[Proxy], moved: &[u32], pairs: &mut Vec<[u32; 2]>, workers: &Workers) {
         if !self.has_order(proxies) || moved.len() * FEW > proxies.len() {
-            self.pairs(proxies, pairs);
+            self.pairs(proxies, pairs, workers);
             return;
         }
         for &i in moved {
@@ -90,7 +102,7 @@ impl Tree {
         }
         self.refit(2);
         self.renew_order(proxies);
-        self.find_moved(proxies, moved, pairs);
+        self.find_moved(proxies, moved, pairs, workers);
     }
 
     /// Whether there is an order for this number of proxies.
@@ -201,18 +213,41 @@ impl Tree {
     }
 
     /// Finds all pairs: each leaf against itself and against the later leaves that overlap its bounds.
-    fn find_all(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>) {
-        let mut len = 0;
-        for (i, leaf) in self.levels[0].iter().enumerate() {
+    fn find_all(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>, workers: &Workers) {
+        let mut searches = std::mem::take(&mut self.searches);
+        let leaves = self.levels[0].len();
+        let size = workers.part(leaves, LEAST_LEAVES);
+        let count = leaves.div_ceil(size).max(1);
+        searches.resize_with(count.max(searches.len()), Search::default);
+        workers.each(searches[..count].iter_mut().enumerate(), |(part, search)| {
+            self.find_of(part * size..((part + 1) * size).min(leaves), proxies, search);
+        });
+        let (first, rest) = searches[..count].split_at_mut(1);
+        for search in rest {
+            let Search { found, len, .. } = &mut first[0];
+            found.truncate(*len);
+            found.extend_from_slice(&search.found[..search.len]);
+            *len = found.len();
+        }
+        self.sort.sort(proxies.len(), &first[0].found[..first[0].len], out);
+        self.searches = searches;
+    }
+
+    /// Finds the pairs of some leaves.
+    fn find_of(&self, leaves: Range<usize>, proxies: &[Proxy], search: &mut Search) {
+        let Search { found, len, stack } = search;
+        *len = 0;
+        for i in leaves {
+            let leaf = &self.levels[0][i];
             for lane in 0..FAN {
                 let later = leaf.hits(&leaf.query(lane)) & (0xFFFE << lane);
-                meet(proxies, &self.order, i * FAN + lane, i, later, &mut self.found, &mut len);
+                meet(proxies, &self.order, i * FAN + lane, i, later, found, len);
             }
             let Some(parents) = self.levels.get(1) else { break };
             let bounds = parents[i / FAN].query(i % FAN);
-            self.stack.clear();
-            self.stack.push([self.levels.len() as u32 - 1, 0]);
-            while let Some([level, node]) = self.stack.pop() {
+            stack.clear();
+            stack.push([self.levels.len() as u32 - 1, 0]);
+            while let Some([level, node]) = stack.pop() {
                 let level = level as usize;
                 // Earlier leaves have already been tested against leaf i.
                 let first = ((i + 1) >> (BITS_OF_FAN * (level - 1))).saturating_sub(node as usize * FAN);
@@ -221,7 +256,7 @@ impl Tree {
                     let child = node * FAN as u32 + hits.trailing_zeros();
                     hits &= hits - 1;
                     if level > 1 {
-                        self.stack.push([level as u32 - 1, child]);
+                        stack.push([level as u32 - 1, child]);
                         continue;
                     }
                     let j = child as usize;
@@ -230,39 +265,46 @@ impl Tree {
                         let lane = members.trailing_zeros() as usize;
                         members &= members - 1;
                         let hits = self.levels[0][j].hits(&leaf.query(lane));
-                        meet(proxies, &self.order, i * FAN + lane, j, hits, &mut self.found, &mut len);
+                        meet(proxies, &self.order, i * FAN + lane, j, hits, found, len);
                     }
                 }
             }
         }
-        self.sort.sort(proxies.len(), &self.found[..len], out);
     }
 
     /// Removes the pairs of proxies that moved, and merges in their new pairs.
-    fn find_moved(&mut self, proxies: &[Proxy], moved: &[u32], pairs: &mut Vec<[u32; 2]>) {
+    fn find_moved(&mut self, proxies: &[Proxy], moved: &[u32], pairs: &mut Vec<[u32; 2]>, workers: &Workers) {
         self.moved.clear();
         self.moved.resize(proxies.len(), false);
         moved.iter().for_each(|&i| self.moved[i as usize] = true);
-        let (mut fresh, mut stack) = (std::mem::take(&mut self.fresh), std::mem::take(&mut self.stack));
-        fresh.clear();
-        for &i in moved {
-            let proxy = &proxies[i as usize];
-            self.query(proxy, &mut stack, |places, mut hits| {
-                while hits != 0 {
-                    let j = places[hits.trailing_zeros() as usize];
-                    hits &= hits - 1;
-                    // If both moved, the lower one reports the pair.
-                    if (!self.moved[j as usize] || i < j) && proxy.may_meet(&proxies[j as usize]) {
-                        fresh.push([i.min(j), i.max(j)]);
+        let mut searches = std::mem::take(&mut self.searches);
+        let size = workers.part(moved.len(), LEAST_MOVED);
+        let count = moved.len().div_ceil(size).max(1);
+        searches.resize_with(count.max(searches.len()), Search::default);
+        searches[..count].iter_mut().for_each(|search| search.found.clear());
+        workers.each(moved.chunks(size).zip(&mut searches), |(moved, Search { found, stack, .. })| {
+            for &i in moved {
+                let proxy = &proxies[i as usize];
+                self.query(proxy, stack, |places, mut hits| {
+                    while hits != 0 {
+                        let j = places[hits.trailing_zeros() as usize];
+                        hits &= hits - 1;
+                        // If both moved, the lower one reports the pair.
+                        if (!self.moved[j as usize] || i < j) && proxy.may_meet(&proxies[j as usize]) {
+                            found.push([i.min(j), i.max(j)]);
+                        }
                     }
-                }
-            });
-        }
+                });
+            }
+        });
+        let (first, rest) = searches[..count].split_at_mut(1);
+        let fresh = &mut first[0].found;
+        rest.iter().for_each(|search| fresh.extend_from_slice(&search.found));
         fresh.sort_unstable();
         self.merged.clear();
         let stays = |pair: &&[u32; 2]| !pair.iter().any(|&i| self.moved[i as usize]);
         let mut kept = pairs.iter().filter(stays).copied().peekable();
-        for &pair in &fresh {
+        for &pair in &*fresh {
             while let Some(earlier) = kept.next_if(|kept| *kept < pair) {
                 self.merged.push(earlier);
             }
@@ -270,7 +312,7 @@ impl Tree {
         }
         self.merged.extend(kept);
         std::mem::swap(pairs, &mut self.merged);
-        (self.fresh, self.stack) = (fresh, stack);
+        self.searches = searches;
     }
 
     /// Calls `visit` with every proxy of a lane returned by `hits` for its node, in no particular order.
@@ -399,7 +441,7 @@ mod tests {
         let mut out = Vec::new();
         for (frame, count) in [(0, 400), (1, 400), (2, 90), (3, 1), (4, 0), (5, 2), (6, 400), (7, 399)] {
             let proxies = scene(frame, count);
-            tree.pairs(&proxies, &mut out);
+            tree.pairs(&proxies, &mut out, &Workers::default());
             validate(&tree, &proxies);
         }
     }
@@ -407,10 +449,12 @@ mod tests {
     /// Four levels. The moved proxies change from frame to frame; their number ranges from one to the most
     /// that is updated incrementally.
     #[test]
-    fn updates_equal_a_new_tree() {
+    fn updates_by_threads_equal_a_new_tree() {
+        let mut workers = Workers::default();
+        workers.set(3);
         let mut proxies = scene(0, 5000);
         let (mut tree, mut pairs, mut expected) = (Tree::default(), Vec::new(), Vec::new());
-        tree.pairs(&proxies, &mut pairs);
+        tree.pairs(&proxies, &mut pairs, &Workers::default());
         for frame in 1..40 {
             let moved: Vec<u32> = (0..5000).filter(|i| (i * 7919 + frame) % (5000 / frame) == 0).collect();
             assert!(moved.len() * FEW <= proxies.len());
@@ -419,9 +463,9 @@ mod tests {
                 let Aabb { min, max } = &mut proxies[i as usize].aabb;
                 (*min, *max) = (*min + shift, *max + shift);
             }
-            tree.update(&proxies, &moved, &mut pairs);
+            tree.update(&proxies, &moved, &mut pairs, &workers);
             validate(&tree, &proxies);
-            Tree::default().pairs(&proxies, &mut expected);
+            Tree::default().pairs(&proxies, &mut expected, &Workers::default());
             assert_eq!(pairs, expected, "frame {frame}");
         }
     }
@@ -432,10 +476,10 @@ mod tests {
         let mut out = Vec::new();
         for frame in 0..200 {
             let proxies = scene(frame, 400);
-            tree.pairs(&proxies, &mut out);
+            tree.pairs(&proxies, &mut out, &Workers::default());
             let cost = tree.cost();
             let mut fresh = Tree::default();
-            fresh.pairs(&proxies, &mut out);
+            fresh.pairs(&proxies, &mut out, &Workers::default());
             assert!(cost <= 1.3 * fresh.cost(), "frame {frame}: {cost} against {}", fresh.cost());
         }
     }

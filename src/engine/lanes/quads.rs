@@ -12,6 +12,7 @@
 
 use super::index::{LaneIndex, assert_fits};
 use bytemuck::{Pod, Zeroable};
+use std::marker::PhantomData;
 use wide::{f32x4, f32x8, f32x16};
 
 /// Four floats, aligned for a single load.
@@ -19,36 +20,60 @@ use wide::{f32x4, f32x8, f32x16};
 #[repr(C, align(16))]
 pub struct Quad(pub [f32; 4]);
 
+/// Quads in memory: those of a slice, or of rows that threads share.
+#[derive(Clone, Copy)]
+pub struct QuadsAt<'a> {
+    first: *mut Quad,
+    len: usize,
+    of: PhantomData<&'a Quad>,
+}
+
+impl QuadsAt<'_> {
+    /// `len` quads from `first` on.
+    ///
+    /// # Safety
+    /// They exist for `'a`, and meanwhile no other thread writes those that are gathered or accesses those that are
+    /// scattered.
+    #[inline(always)]
+    pub unsafe fn new(first: *mut Quad, len: usize) -> Self {
+        QuadsAt { first, len, of: PhantomData }
+    }
+}
+
+/// For gathers; a scatter needs a mutable slice.
+impl<'a> From<&'a [Quad]> for QuadsAt<'a> {
+    #[inline(always)]
+    fn from(quads: &'a [Quad]) -> Self {
+        QuadsAt { first: quads.as_ptr().cast_mut(), len: quads.len(), of: PhantomData }
+    }
+}
+
+impl<'a> From<&'a mut [Quad]> for QuadsAt<'a> {
+    #[inline(always)]
+    fn from(quads: &'a mut [Quad]) -> Self {
+        QuadsAt { first: quads.as_mut_ptr(), len: quads.len(), of: PhantomData }
+    }
+}
+
 /// Quad `OFFSET` of record `i`.
 ///
 /// # Safety
-/// `i * STRIDE + OFFSET < quads.len()`.
+/// `i * STRIDE + OFFSET < quads.len`.
 #[inline(always)]
-unsafe fn at<const STRIDE: usize, const OFFSET: usize>(quads: &[Quad], i: u32) -> *const f32 {
-    debug_assert!(i as usize * STRIDE + OFFSET < quads.len());
+unsafe fn at<const STRIDE: usize, const OFFSET: usize>(quads: QuadsAt<'_>, i: u32) -> *mut f32 {
+    debug_assert!(i as usize * STRIDE + OFFSET < quads.len);
     // SAFETY: the caller's promise.
-    unsafe { quads.as_ptr().add(i as usize * STRIDE + OFFSET).cast() }
-}
-
-/// As [`at`], for writing.
-///
-/// # Safety
-/// `i * STRIDE + OFFSET < quads.len()`.
-#[inline(always)]
-unsafe fn at_mut<const STRIDE: usize, const OFFSET: usize>(quads: &mut [Quad], i: u32) -> *mut f32 {
-    debug_assert!(i as usize * STRIDE + OFFSET < quads.len());
-    // SAFETY: the caller's promise.
-    unsafe { quads.as_mut_ptr().add(i as usize * STRIDE + OFFSET).cast() }
+    unsafe { quads.first.add(i as usize * STRIDE + OFFSET).cast() }
 }
 
 /// Checks that every record in `index` has quad `OFFSET`; returns the indices.
 #[inline(always)]
 fn checked<'a, I: Pod, const STRIDE: usize, const OFFSET: usize>(
-    quads: &[Quad],
+    quads: QuadsAt<'_>,
     index: LaneIndex<'a, I>,
 ) -> &'a I {
     const { assert!(OFFSET < STRIDE) };
-    assert_fits(index.bound(), quads.len(), STRIDE);
+    assert_fits(index.bound(), quads.len, STRIDE);
     index.array()
 }
 
@@ -81,19 +106,24 @@ pub fn prefetch_records<const STRIDE: usize>(quads: &[Quad], index: impl Iterato
 /// Prefetches the cache line of quad `OFFSET` of record `i` of `STRIDE` quads.
 #[inline(always)]
 pub fn prefetch_quad<const STRIDE: usize, const OFFSET: usize>(quads: &[Quad], i: u32) {
+    prefetch_line(quads.as_ptr().wrapping_add(i as usize * STRIDE + OFFSET));
+}
+
+/// Prefetches the cache line of a quad.
+#[inline(always)]
+pub fn prefetch_line(quad: *const Quad) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        let quad = quads.as_ptr().wrapping_add(i as usize * STRIDE + OFFSET);
         // SAFETY: a hint; it faults at no address.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(quad.cast()) };
     }
     #[cfg(not(target_arch = "x86_64"))]
-    let _ = (quads, i);
+    let _ = quad;
 }
 
 #[inline(always)]
-pub fn gather_1<const S: usize, const O: usize>(quads: &[Quad], index: LaneIndex<[u32; 1]>) -> [f32; 4] {
+pub fn gather_1<const S: usize, const O: usize>(quads: QuadsAt<'_>, index: LaneIndex<[u32; 1]>) -> [f32; 4] {
     let [i] = *checked::<_, S, O>(quads, index);
     // SAFETY: `checked`; a quad is four floats.
     unsafe { *at::<S, O>(quads, i).cast::<[f32; 4]>() }
@@ -101,18 +131,18 @@ pub fn gather_1<const S: usize, const O: usize>(quads: &[Quad], index: LaneIndex
 
 #[inline(always)]
 pub fn scatter_1<const S: usize, const O: usize>(
-    quads: &mut [Quad],
+    quads: QuadsAt<'_>,
     index: LaneIndex<[u32; 1]>,
     v: [f32; 4],
 ) {
     let [i] = *checked::<_, S, O>(quads, index);
     // SAFETY: `checked`; a quad is four floats.
-    unsafe { *at_mut::<S, O>(quads, i).cast::<[f32; 4]>() = v }
+    unsafe { *at::<S, O>(quads, i).cast::<[f32; 4]>() = v }
 }
 
 #[inline(always)]
 pub fn scatter_halves_1<const S: usize, const O: usize, const P: usize>(
-    quads: &mut [Quad],
+    quads: QuadsAt<'_>,
     index: LaneIndex<[u32; 1]>,
     v: [f32; 4],
 ) {
@@ -125,22 +155,25 @@ pub fn scatter_halves_1<const S: usize, const O: usize, const P: usize>(
 /// Writes `v[..2]` to the second half of quad `O` of record `i`, and `v[2..]` to that of quad `P`.
 ///
 /// # Safety
-/// `i * S + max(O, P) < quads.len()`.
+/// `i * S + max(O, P) < quads.len`.
 #[inline(always)]
 unsafe fn store_halves<const S: usize, const O: usize, const P: usize>(
-    quads: &mut [Quad],
+    quads: QuadsAt<'_>,
     i: u32,
     v: [f32; 4],
 ) {
     // SAFETY: the caller's promise; the second half of a quad is two floats.
     unsafe {
-        *at_mut::<S, O>(quads, i).add(2).cast::<[f32; 2]>() = [v[0], v[1]];
-        *at_mut::<S, P>(quads, i).add(2).cast::<[f32; 2]>() = [v[2], v[3]];
+        *at::<S, O>(quads, i).add(2).cast::<[f32; 2]>() = [v[0], v[1]];
+        *at::<S, P>(quads, i).add(2).cast::<[f32; 2]>() = [v[2], v[3]];
     }
 }
 
 #[inline(always)]
-pub fn gather_4<const S: usize, const O: usize>(quads: &[Quad], index: LaneIndex<[u32; 4]>) -> [f32x4; 4] {
+pub fn gather_4<const S: usize, const O: usize>(
+    quads: QuadsAt<'_>,
+    index: LaneIndex<[u32; 4]>,
+) -> [f32x4; 4] {
     let index = checked::<_, S, O>(quads, index);
     // SAFETY: `checked`; quads are aligned as `f32x4` is.
     f32x4::transpose(unsafe {
@@ -155,20 +188,20 @@ pub fn gather_4<const S: usize, const O: usize>(quads: &[Quad], index: LaneIndex
 
 #[inline(always)]
 pub fn scatter_4<const S: usize, const O: usize>(
-    quads: &mut [Quad],
+    quads: QuadsAt<'_>,
     index: LaneIndex<[u32; 4]>,
     v: [f32x4; 4],
 ) {
     let index = checked::<_, S, O>(quads, index);
     for (lane, quad) in f32x4::transpose(v).into_iter().enumerate() {
         // SAFETY: `checked`; quads are aligned as `f32x4` is.
-        unsafe { *at_mut::<S, O>(quads, index[lane]).cast::<f32x4>() = quad }
+        unsafe { *at::<S, O>(quads, index[lane]).cast::<f32x4>() = quad }
     }
 }
 
 #[inline(always)]
 pub fn scatter_halves_4<const S: usize, const O: usize, const P: usize>(
-    quads: &mut [Quad],
+    quads: QuadsAt<'_>,
     index: LaneIndex<[u32; 4]>,
     v: [f32x4; 4],
 ) {
@@ -222,7 +255,7 @@ macro_rules! registers {
             /// Every record in `index` has quad `O`.
             #[inline(always)]
             unsafe fn load<const S: usize, const O: usize>(
-                quads: &[Quad],
+                quads: QuadsAt<'_>,
                 index: &[u32; 4 * $lanes],
                 k: usize,
             ) -> $register {
@@ -238,7 +271,7 @@ macro_rules! registers {
 
             #[inline(always)]
             pub fn $gather<const S: usize, const O: usize>(
-                quads: &[Quad],
+                quads: QuadsAt<'_>,
                 index: LaneIndex<[u32; 4 * $lanes]>,
             ) -> [$float; 4] {
                 let index = checked::<_, S, O>(quads, index);
@@ -269,7 +302,7 @@ macro_rules! registers {
 
             #[inline(always)]
             pub fn $scatter<const S: usize, const O: usize>(
-                quads: &mut [Quad],
+                quads: QuadsAt<'_>,
                 index: LaneIndex<[u32; 4 * $lanes]>,
                 v: [$float; 4],
             ) {
@@ -277,14 +310,14 @@ macro_rules! registers {
                 for (k, row) in rows(v).into_iter().enumerate() {
                     for (q, quad) in row.into_iter().enumerate() {
                         // SAFETY: `checked`; quads are aligned.
-                        unsafe { _mm_store_ps(at_mut::<S, O>(quads, index[4 * q + k]), quad) }
+                        unsafe { _mm_store_ps(at::<S, O>(quads, index[4 * q + k]), quad) }
                     }
                 }
             }
 
             #[inline(always)]
             pub fn $halves<const S: usize, const O: usize, const P: usize>(
-                quads: &mut [Quad],
+                quads: QuadsAt<'_>,
                 index: LaneIndex<[u32; 4 * $lanes]>,
                 v: [$float; 4],
             ) {
@@ -296,8 +329,8 @@ macro_rules! registers {
                         // each instruction stores.
                         unsafe {
                             let quad = _mm_castps_pd(quad);
-                            _mm_storel_pd(at_mut::<S, O>(quads, index[4 * q + k]).add(2).cast(), quad);
-                            _mm_storeh_pd(at_mut::<S, P>(quads, index[4 * q + k]).add(2).cast(), quad);
+                            _mm_storel_pd(at::<S, O>(quads, index[4 * q + k]).add(2).cast(), quad);
+                            _mm_storeh_pd(at::<S, P>(quads, index[4 * q + k]).add(2).cast(), quad);
                         }
                     }
                 }
@@ -381,7 +414,7 @@ mod halves {
          $gather_half:ident, $scatter_half:ident, $halves_half:ident) => {
             #[inline(always)]
             pub fn $gather<const S: usize, const O: usize>(
-                quads: &[Quad],
+                quads: QuadsAt<'_>,
                 index: LaneIndex<[u32; $width]>,
             ) -> [$whole; 4] {
                 let [low, high] = index.halves();
@@ -392,7 +425,7 @@ mod halves {
 
             #[inline(always)]
             pub fn $scatter<const S: usize, const O: usize>(
-                quads: &mut [Quad],
+                quads: QuadsAt<'_>,
                 index: LaneIndex<[u32; $width]>,
                 v: [$whole; 4],
             ) {
@@ -404,7 +437,7 @@ mod halves {
 
             #[inline(always)]
             pub fn $halves<const S: usize, const O: usize, const P: usize>(
-                quads: &mut [Quad],
+                quads: QuadsAt<'_>,
                 index: LaneIndex<[u32; $width]>,
                 v: [$whole; 4],
             ) {

@@ -2,7 +2,9 @@
 
 use super::index::LaneIndex;
 use super::quads::{self, Quad};
+use super::shared::Shared;
 use super::vector::{FUSED, INTEGERS, Lanes, MANTISSA};
+use bytemuck::Pod;
 
 impl Lanes for f32 {
     const WIDTH: usize = 1;
@@ -50,11 +52,28 @@ impl Lanes for f32 {
     }
 
     #[inline(always)]
+    fn gather_shared<T: Pod + Send, const S: usize, const O: usize>(
+        records: Shared<'_, T>,
+        index: LaneIndex<Self::Index>,
+    ) -> [Self; 4] {
+        quads::gather_1::<S, O>(records.quads(), index)
+    }
+
+    #[inline(always)]
+    fn scatter_shared<T: Pod + Send, const S: usize, const O: usize>(
+        records: Shared<'_, T>,
+        index: LaneIndex<Self::Index>,
+        v: [Self; 4],
+    ) {
+        quads::scatter_1::<S, O>(records.quads(), index, v)
+    }
+
+    #[inline(always)]
     fn gather_quads<const S: usize, const O: usize>(
         quads: &[Quad],
         index: LaneIndex<Self::Index>,
     ) -> [Self; 4] {
-        quads::gather_1::<S, O>(quads, index)
+        quads::gather_1::<S, O>(quads.into(), index)
     }
 
     #[inline(always)]
@@ -63,7 +82,7 @@ impl Lanes for f32 {
         index: LaneIndex<Self::Index>,
         v: [Self; 4],
     ) {
-        quads::scatter_1::<S, O>(quads, index, v)
+        quads::scatter_1::<S, O>(quads.into(), index, v)
     }
 
     #[inline(always)]
@@ -72,7 +91,7 @@ impl Lanes for f32 {
         index: LaneIndex<Self::Index>,
         v: [Self; 4],
     ) {
-        quads::scatter_halves_1::<S, O, P>(quads, index, v)
+        quads::scatter_halves_1::<S, O, P>(quads.into(), index, v)
     }
 
     #[inline(always)]

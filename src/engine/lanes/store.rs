@@ -2,6 +2,7 @@
 
 use super::index::{IndexList, LaneIndex, assert_fits};
 use super::rows::BodyRow;
+use super::shared::SharedRows;
 use super::vector::Lanes;
 
 /// Rows of bodies that a sweep gathers from and scatters to.
@@ -51,5 +52,27 @@ impl RowStore for [BodyRow] {
     #[inline(always)]
     fn scatter_velocity<L: Lanes>(&mut self, index: LaneIndex<L::Index>, velocity: [L; 4]) {
         L::scatter_velocity(self, index, velocity)
+    }
+}
+
+impl RowStore for SharedRows<'_> {
+    #[inline(always)]
+    fn assert_rows(&self, index: IndexList) {
+        assert_fits(index.bound(), self.len(), 1);
+    }
+
+    #[inline(always)]
+    fn gather<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
+        L::gather_shared_rows(*self, index)
+    }
+
+    #[inline(always)]
+    fn gather_whole<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
+        L::gather_whole_shared_rows(*self, index)
+    }
+
+    #[inline(always)]
+    fn scatter_velocity<L: Lanes>(&mut self, index: LaneIndex<L::Index>, velocity: [L; 4]) {
+        L::scatter_shared::<_, 2, 0>(*self, index, velocity)
     }
 }

@@ -11,6 +11,7 @@
 use super::index::{LaneIndex, assert_fits};
 use super::quads::Quad;
 use super::rows::BodyRow;
+use super::shared::{Shared, SharedRows};
 use bytemuck::Pod;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -21,7 +22,14 @@ pub const FUSED: bool = cfg!(any(
 ));
 /// `WIDTH` floats that are processed together.
 pub trait Lanes:
-    Pod + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+    Pod
+    + Send
+    + Sync
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
 {
     /// The number of lanes.
     const WIDTH: usize;
@@ -92,6 +100,45 @@ pub trait Lanes:
     fn scatter_delta(rows: &mut [BodyRow], index: LaneIndex<Self::Index>, delta: [Self; 4]) {
         Self::scatter_quads::<2, 1>(bytemuck::cast_slice_mut(rows), index, delta)
     }
+
+    /// As [`Self::gather`], from rows that threads may share.
+    ///
+    /// # Panics
+    /// As [`Self::gather`].
+    #[inline(always)]
+    fn gather_shared_rows(rows: SharedRows<'_>, index: LaneIndex<Self::Index>) -> [Self; 8] {
+        let v = Self::gather_shared::<_, 2, 0>(rows, index);
+        let d = Self::gather_shared::<_, 2, 1>(rows, index);
+        [v[0], v[1], v[2], v[3], d[0], d[1], d[2], d[3]]
+    }
+
+    /// As [`Self::gather_whole`], from rows that threads may share.
+    ///
+    /// # Panics
+    /// As [`Self::gather`].
+    #[inline(always)]
+    fn gather_whole_shared_rows(rows: SharedRows<'_>, index: LaneIndex<Self::Index>) -> [Self; 8] {
+        Self::gather_shared_rows(rows, index)
+    }
+
+    /// As [`Self::gather_quads`], from records that threads may share.
+    ///
+    /// # Panics
+    /// As [`Self::gather_quads`].
+    fn gather_shared<T: Pod + Send, const S: usize, const O: usize>(
+        records: Shared<'_, T>,
+        index: LaneIndex<Self::Index>,
+    ) -> [Self; 4];
+
+    /// As [`Self::scatter_quads`], to records that threads may share.
+    ///
+    /// # Panics
+    /// As [`Self::gather_quads`].
+    fn scatter_shared<T: Pod + Send, const S: usize, const O: usize>(
+        records: Shared<'_, T>,
+        index: LaneIndex<Self::Index>,
+        v: [Self; 4],
+    );
 
     /// Quad `O` of `WIDTH` records of `S` quads each, transposed.
     ///

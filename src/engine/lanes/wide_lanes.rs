@@ -3,8 +3,9 @@
 use super::index::LaneIndex;
 use super::quads::{self, Quad};
 use super::rows::{self, BodyRow};
+use super::shared::{Shared, SharedRows};
 use super::vector::{INTEGERS, Lanes, MANTISSA};
-use bytemuck::Zeroable;
+use bytemuck::{Pod, Zeroable};
 use wide::{f32x4, f32x8, f32x16, i32x4, i32x8, i32x16};
 
 macro_rules! wide_lanes {
@@ -18,16 +19,48 @@ macro_rules! wide_lanes {
             $(
                 #[inline(always)]
                 fn gather(rows: &[BodyRow], index: LaneIndex<Self::Index>) -> [Self; 8] {
-                    rows::$gather(rows, index)
+                    rows::$gather(rows.into(), index)
+                }
+
+                #[inline(always)]
+                fn gather_shared_rows(rows: SharedRows<'_>, index: LaneIndex<Self::Index>) -> [Self; 8] {
+                    rows::$gather(rows.rows(), index)
+                }
+
+                #[inline(always)]
+                fn gather_whole_shared_rows(rows: SharedRows<'_>, index: LaneIndex<Self::Index>) -> [Self; 8] {
+                    rows::$gather(rows.rows(), index)
                 }
             )?
 
             $(
                 #[inline(always)]
                 fn gather_whole(rows: &[BodyRow], index: LaneIndex<Self::Index>) -> [Self; 8] {
-                    rows::$whole(rows, index)
+                    rows::$whole(rows.into(), index)
+                }
+
+                #[inline(always)]
+                fn gather_whole_shared_rows(rows: SharedRows<'_>, index: LaneIndex<Self::Index>) -> [Self; 8] {
+                    rows::$whole(rows.rows(), index)
                 }
             )?
+
+            #[inline(always)]
+            fn gather_shared<T: Pod + Send, const S: usize, const O: usize>(
+                records: Shared<'_, T>,
+                index: LaneIndex<Self::Index>,
+            ) -> [Self; 4] {
+                quads::$gather_quads::<S, O>(records.quads(), index)
+            }
+
+            #[inline(always)]
+            fn scatter_shared<T: Pod + Send, const S: usize, const O: usize>(
+                records: Shared<'_, T>,
+                index: LaneIndex<Self::Index>,
+                v: [Self; 4],
+            ) {
+                quads::$scatter::<S, O>(records.quads(), index, v)
+            }
 
             #[inline(always)]
             fn splat(value: f32) -> Self {
@@ -74,7 +107,7 @@ macro_rules! wide_lanes {
                 quads: &[Quad],
                 index: LaneIndex<Self::Index>,
             ) -> [Self; 4] {
-                quads::$gather_quads::<S, O>(quads, index)
+                quads::$gather_quads::<S, O>(quads.into(), index)
             }
 
             #[inline(always)]
@@ -83,7 +116,7 @@ macro_rules! wide_lanes {
                 index: LaneIndex<Self::Index>,
                 v: [Self; 4],
             ) {
-                quads::$scatter::<S, O>(quads, index, v)
+                quads::$scatter::<S, O>(quads.into(), index, v)
             }
 
             #[inline(always)]
@@ -92,7 +125,7 @@ macro_rules! wide_lanes {
                 index: LaneIndex<Self::Index>,
                 v: [Self; 4],
             ) {
-                quads::$halves::<S, O, P>(quads, index, v)
+                quads::$halves::<S, O, P>(quads.into(), index, v)
             }
 
             #[inline(always)]

@@ -1,5 +1,10 @@
 //! The narrow phase of many pairs of one kind: updates manifolds in place, in lanes.
 
+#![allow(
+    unsafe_code,
+    reason = "threads that share the list of contacts, each pair with a contact of its own"
+)]
+
 use super::Margins;
 use super::circles::{self, Rolling};
 use super::frozen::{self, Found, FreezeLimits};
@@ -10,9 +15,10 @@ use super::lanes::{Class, PoseRow, Poses, ShapePair, ShapeRow, Touch};
 use super::rectangles;
 use crate::contacts::{Contact, quad};
 use crate::lanes::{
-    IndexList, LaneIndex, LaneWidth, Lanes, MOST_LANES, PickedIndices, Quad, align_frame, prefetch_records,
+    IndexList, LaneIndex, LaneWidth, Lanes, MOST_LANES, PickedIndices, Quad, Shared, align_frame,
 };
 use crate::shapes::Shape;
+use crate::workers::Workers;
 use bytemuck::bytes_of;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hasher};
@@ -147,6 +153,9 @@ pub struct Jobs {
     pub contact: Vec<u32>,
 }
 
+/// Number of pairs from which on threads share them.
+const LEAST_SHARED: usize = 512;
+
 /// Index of a pair without a contact.
 pub const NO_CONTACT: u32 = u32::MAX;
 
@@ -196,6 +205,8 @@ pub struct Input<'a> {
     pub margins: Margins,
     /// Limits within which contacts are [frozen](super::frozen).
     pub freezing: Option<FreezeLimits>,
+    /// Threads that may share the pairs.
+    pub workers: &'a Workers,
 }
 
 /// Collides every job and updates its contact: geometry is recomputed, and impulses are kept for unchanged
@@ -227,6 +238,7 @@ pub fn update(
         list
     };
     let made = contacts.len();
+    let workers = input.workers;
     assert!(input.displacements.len() == input.poses.len(), "displacements of as many bodies as poses");
     let [a, b] = jobs.bodies.each_ref().map(|list| below(list, input.poses.len(), "bodies"));
     let [c, d] = jobs.shapes.each_ref().map(|list| below(list, input.shapes.rows.len(), "shapes"));
@@ -234,8 +246,10 @@ pub fn update(
     let beyond = jobs.contact.iter().fold(0, |most, &i| i.wrapping_add(1).max(most));
     assert!(jobs.contact.len() == count, "{count} pairs, and contacts for {}", jobs.contact.len());
     assert!(beyond as usize <= made, "a pair of contact {} of {made}", beyond.wrapping_sub(1));
-    // A batch of new contacts, and one that pairs without a contact read.
-    contacts.resize(made + width.lanes() + 1, Contact::default());
+    let parts = if count < LEAST_SHARED { 1 } else { workers.count() };
+    // For each part a batch of new contacts, and one that pairs without a contact read.
+    let spare = width.lanes() + 1;
+    contacts.resize(made + parts * spare, Contact::default());
     if input.freezing.is_some() {
         assert!(found.len() == made, "{made} contacts, of which {} were found", found.len());
         found.resize(contacts.len(), Found::NEVER);
@@ -251,8 +265,30 @@ pub fn update(
         #[cfg(not(any(target_feature = "avx512f", feature = "emulated")))]
         LaneWidth::W16 => unreachable!("widths are limited to those of the build"),
     };
-    let lists = JobLists([a, b, c, d, IndexList::new(&jobs.name), IndexList::new(&jobs.contact)]);
-    let points = run(lists, input, Room { contacts, found, made }, change);
+    let lists = [a, b, c, d, IndexList::new(&jobs.name), IndexList::new(&jobs.contact)];
+    let shared = (Shared::from(&mut **contacts), Shared::from(&mut **found));
+    let room = |(contacts, found), part: usize| Room { contacts, found, made: made + part * spare };
+    let mut points = 0;
+    if parts == 1 {
+        points = run(JobLists(lists), input, room(shared, 0), change);
+    } else {
+        // SAFETY: every pair has a contact of its own, and every part its own spare contacts.
+        let (of_contacts, of_found) = unsafe { (shared.0.sent(), shared.1.sent()) };
+        let size = workers.part(count, 1);
+        let mut results: Vec<(usize, Vec<(u32, Contact, Option<Found>)>)> =
+            (0..count.div_ceil(size)).map(|_| Default::default()).collect();
+        workers.each(results.iter_mut().enumerate(), |(part, (points, changes))| {
+            let jobs = part * size..((part + 1) * size).min(count);
+            let lists = JobLists(lists.map(|list| list.part(jobs.clone())));
+            let room = room((of_contacts.get(), of_found.get()), part);
+            *points =
+                run(lists, input, room, &mut |name, contact, found| changes.push((name, *contact, found)));
+        });
+        for (of_part, changes) in results {
+            points += of_part;
+            changes.iter().for_each(|(name, contact, found)| change(*name, contact, *found));
+        }
+    }
     contacts.truncate(made);
     found.truncate(made);
     points
@@ -269,10 +305,10 @@ pub(super) const CONTACT: usize = LISTS - 1;
 
 /// Where kernels write their results.
 struct Room<'a> {
-    contacts: &'a mut [Contact],
+    contacts: Shared<'a, Contact>,
     /// One per contact; empty if nothing is frozen.
-    found: &'a mut [Found],
-    /// New manifolds are built from this index on.
+    found: Shared<'a, Found>,
+    /// New manifolds are built from this index on, one for each lane; pairs without a contact read the one behind them.
     made: usize,
 }
 
@@ -299,8 +335,9 @@ fn run_of<L: Lanes>(kind: PairKind) -> CollideFn {
 fn run<L: Lanes, const KIND: usize>(lists: JobLists, input: Input, room: Room, change: &mut Change) -> usize {
     // Spilled vectors then do not cross cache lines; see `align_frame`.
     align_frame();
-    let Input { poses, displacements, rolling, shapes: Shapes { rows, hulls, .. }, margins, freezing } =
-        input;
+    let Input {
+        poses, displacements, rolling, shapes: Shapes { rows, hulls, .. }, margins, freezing, ..
+    } = input;
     let freezing = freezing.map(|limits| (limits, poses));
     let has_radii = rolling.is_some();
     match const { PairKind::ALL[KIND] } {
@@ -369,7 +406,7 @@ fn run_kernel<L: Lanes>(
     freezing: Option<(FreezeLimits, &[PoseRow])>,
     has_radii: bool,
     change: &mut Change,
-    mut kernel: impl FnMut([LaneIndex<L::Index>; 4], &mut [Found], LaneIndex<L::Index>) -> (Touch<L>, [L; 2]),
+    mut kernel: impl FnMut([LaneIndex<L::Index>; 4], Shared<'_, Found>, LaneIndex<L::Index>) -> (Touch<L>, [L; 2]),
 ) -> usize {
     let (mut points, mut next) = (0_u32, 0);
     let count = lists.0[CONTACT].entries().len();
@@ -380,7 +417,8 @@ fn run_kernel<L: Lanes>(
             while waiting < L::WIDTH && next < count {
                 let first = next;
                 next = (first + L::WIDTH).min(count);
-                let kept = frozen::follow::<L>(lists, first..next, poses, limits, (contacts, found));
+                let none = (made + L::WIDTH) as u32;
+                let kept = frozen::follow::<L>(lists, first..next, poses, limits, (contacts, found, none));
                 let mut places = [0; MOST_LANES];
                 let before = waiting;
                 for (place, kept) in places.iter_mut().zip(&kept[..next - first]) {
@@ -422,7 +460,7 @@ fn run_kernel<L: Lanes>(
             let coming = (next + L::WIDTH).min(count)..(next + 2 * L::WIDTH).min(count);
             let coming =
                 contact.entries()[coming].iter().map(|&i| if i == NO_CONTACT { made as u32 } else { i });
-            prefetch_records::<{ quad::STRIDE }>(bytemuck::cast_slice(contacts), coming);
+            coming.for_each(|i| contacts.prefetch(i));
             let of_batch = next..next + filled;
             next += filled;
             (indices, &name.entries()[of_batch.clone()], &contact.entries()[of_batch])
@@ -439,12 +477,11 @@ fn run_kernel<L: Lanes>(
         }
         let target_lanes = LaneIndex::new(&target);
         let (touch, radii) = kernel(indices, found, target_lanes);
-        merge(&touch, bytemuck::cast_slice_mut(contacts), target_lanes);
+        merge(&touch, contacts, target_lanes);
         if has_radii {
-            let quads: &mut [Quad] = bytemuck::cast_slice_mut(contacts);
-            let [sum, _, _, rest] = L::gather_quads::<{ quad::STRIDE }, { quad::RADII }>(quads, target_lanes);
-            let last = [sum, radii[0], radii[1], rest];
-            L::scatter_quads::<{ quad::STRIDE }, { quad::RADII }>(quads, target_lanes, last);
+            const { assert!(quad::STRIDE == 8 && quad::RADII == 7) };
+            let [sum, _, _, rest] = L::gather_shared::<_, 8, 7>(contacts, target_lanes);
+            L::scatter_shared::<_, 8, 7>(contacts, target_lanes, [sum, radii[0], radii[1], rest]);
         }
         // Counts are copied to memory, so that a batch without changes needs only one comparison.
         let mut counts = [0.0_f32; MOST_LANES];
@@ -462,7 +499,8 @@ fn run_kernel<L: Lanes>(
             for lane in 0..filled {
                 if (counts[lane] > 0.0) != (known[lane] != NO_CONTACT) {
                     let target = target[lane] as usize;
-                    change(names[lane], &contacts[target], found.get(target).copied());
+                    let found = (!found.is_empty()).then(|| found.get(target));
+                    change(names[lane], &contacts.get(target), found);
                 }
             }
         }
@@ -480,12 +518,12 @@ fn run_kernel<L: Lanes>(
 ///
 /// No two lanes may have the same target.
 #[inline(always)]
-fn merge<L: Lanes>(touch: &Touch<L>, contacts: &mut [Quad], target: LaneIndex<L::Index>) {
+fn merge<L: Lanes>(touch: &Touch<L>, contacts: Shared<'_, Contact>, target: LaneIndex<L::Index>) {
     use quad::*;
-    let header = L::gather_quads::<STRIDE, HEADER>(contacts, target);
+    let header = L::gather_shared::<_, STRIDE, HEADER>(contacts, target);
     let old = [
-        L::gather_quads::<STRIDE, STATE_0>(contacts, target),
-        L::gather_quads::<STRIDE, STATE_1>(contacts, target),
+        L::gather_shared::<_, STRIDE, STATE_0>(contacts, target),
+        L::gather_shared::<_, STRIDE, STATE_1>(contacts, target),
     ];
     let (zero, nothing) = (L::zero(), L::splat(f32::NAN));
     let count = touch.count.integer_bits();
@@ -506,9 +544,9 @@ fn merge<L: Lanes>(touch: &Touch<L>, contacts: &mut [Quad], target: LaneIndex<L:
         |p: usize| [touch.anchor_a[p][0], touch.anchor_a[p][1], touch.anchor_b[p][0], touch.anchor_b[p][1]];
     let header = [touch.normal[0], touch.normal[1], count, header[3]];
     let (state_0, state_1) = (state(0), state(1));
-    L::scatter_quads::<STRIDE, ANCHORS_0>(contacts, target, anchors(0));
-    L::scatter_quads::<STRIDE, STATE_0>(contacts, target, state_0);
-    L::scatter_quads::<STRIDE, ANCHORS_1>(contacts, target, anchors(1));
-    L::scatter_quads::<STRIDE, STATE_1>(contacts, target, state_1);
-    L::scatter_quads::<STRIDE, HEADER>(contacts, target, header);
+    L::scatter_shared::<_, STRIDE, ANCHORS_0>(contacts, target, anchors(0));
+    L::scatter_shared::<_, STRIDE, STATE_0>(contacts, target, state_0);
+    L::scatter_shared::<_, STRIDE, ANCHORS_1>(contacts, target, anchors(1));
+    L::scatter_shared::<_, STRIDE, STATE_1>(contacts, target, state_1);
+    L::scatter_shared::<_, STRIDE, HEADER>(contacts, target, header);
 }

@@ -43,7 +43,7 @@ use super::Margins;
 use super::batch::{JobLists, NO_CONTACT};
 use super::lanes::{PoseRow, Poses, Touch, abs, rotate, unrotate};
 use crate::contacts::{Contact, quad};
-use crate::lanes::{LaneIndex, Lanes, MOST_LANES, Quad, align_frame, prefetch_quad, prefetch_records};
+use crate::lanes::{LaneIndex, Lanes, MOST_LANES, Shared, align_frame};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 
@@ -138,7 +138,7 @@ impl Found {
     /// poses gives the same contacts. Does nothing if `found` is empty.
     #[inline(always)]
     pub fn note<L: Lanes>(
-        found: &mut [Found],
+        found: Shared<'_, Found>,
         target: LaneIndex<L::Index>,
         poses: &Poses<L>,
         touch: Touch<L>,
@@ -157,9 +157,8 @@ impl Found {
         let gap = [0, 1].map(|p| turns.gap(poses, normal, anchor_a[p], anchor_b[p]));
         let start = [0, 1].map(|p| touch.separation[p] - gap[p]);
         let [x, y] = unrotate(a, poses.centers);
-        let quads: &mut [Quad] = bytemuck::cast_slice_mut(found);
-        L::scatter_quads::<STRIDE, PLACE>(quads, target, [x, y, start[0], start[1]]);
-        L::scatter_quads::<STRIDE, TURNS>(quads, target, [a[0], a[1], b[0], b[1]]);
+        L::scatter_shared::<_, STRIDE, PLACE>(found, target, [x, y, start[0], start[1]]);
+        L::scatter_shared::<_, STRIDE, TURNS>(found, target, [a[0], a[1], b[0], b[1]]);
         let separation = [0, 1].map(|p| start[p] + gap[p]);
         Touch { normal, anchor_a, anchor_b, separation, ..touch }
     }
@@ -185,28 +184,25 @@ impl<L: Lanes> Turns<L> {
 }
 
 /// Lets the contacts of a batch of jobs stay frozen whose bodies have hardly moved: their separations follow the bodies.
-/// Returns the number of points of each contact that stays frozen, and 0 for other jobs. Jobs without a contact read the
-/// last one, which never stays frozen.
+/// Returns the number of points of each contact that stays frozen, and 0 for other jobs. Jobs without a contact read
+/// contact `none`, which never stays frozen.
 #[inline(never)]
 pub(super) fn follow<L: Lanes>(
     lists: JobLists,
     batch: Range<usize>,
     poses: &[PoseRow],
     limits: FreezeLimits,
-    (contacts, found): (&mut [Contact], &[Found]),
+    (contacts, found, none): (Shared<'_, Contact>, Shared<'_, Found>, u32),
 ) -> [f32; MOST_LANES] {
     use quad::{ANCHORS_0, ANCHORS_1, HEADER, STATE_0, STATE_1};
     const RECORD: usize = quad::STRIDE;
     align_frame();
-    let (quads, found): (&mut [Quad], &[Quad]) =
-        (bytemuck::cast_slice_mut(contacts), bytemuck::cast_slice(found));
-    let none = (found.len() / STRIDE - 1) as u32;
     let contact_of = |&i: &u32| if i == NO_CONTACT { none } else { i };
     let [a, b, .., all] = lists.0;
     let coming = batch.end..(batch.end + L::WIDTH).min(all.entries().len());
     for i in all.entries()[coming].iter().map(contact_of) {
-        prefetch_quad::<STRIDE, PLACE>(found, i);
-        prefetch_records::<RECORD>(quads, [i].into_iter());
+        found.prefetch(i);
+        contacts.prefetch(i);
     }
     let mut target = [none; MOST_LANES];
     target.iter_mut().zip(&all.entries()[batch.clone()]).for_each(|(to, i)| *to = contact_of(i));
@@ -217,8 +213,8 @@ pub(super) fn follow<L: Lanes>(
     let (zero, one, two) = (L::zero(), L::splat(1.0), L::splat(2.0).integer_bits());
     let mut counts = [0.0; MOST_LANES];
 
-    let [x, y, s_0, s_1] = L::gather_quads::<STRIDE, PLACE>(found, target);
-    let [cos_a, sin_a, cos_b, sin_b] = L::gather_quads::<STRIDE, TURNS>(found, target);
+    let [x, y, s_0, s_1] = L::gather_shared::<_, STRIDE, PLACE>(found, target);
+    let [cos_a, sin_a, cos_b, sin_b] = L::gather_shared::<_, STRIDE, TURNS>(found, target);
     let ([a, b], [a_0, b_0]) = (poses.rotation, [[cos_a, sin_a], [cos_b, sin_b]]);
     let offset = unrotate(a, poses.centers);
     let moved = [offset[0] - x, offset[1] - y];
@@ -233,8 +229,8 @@ pub(super) fn follow<L: Lanes>(
     if !stays.any_positive() {
         return counts;
     }
-    let [separation_0, id_0, normal_0, tangent_0] = L::gather_quads::<RECORD, STATE_0>(quads, target);
-    let [separation_1, id_1, normal_1, tangent_1] = L::gather_quads::<RECORD, STATE_1>(quads, target);
+    let [separation_0, id_0, normal_0, tangent_0] = L::gather_shared::<_, RECORD, STATE_0>(contacts, target);
+    let [separation_1, id_1, normal_1, tangent_1] = L::gather_shared::<_, RECORD, STATE_1>(contacts, target);
     if limits.loaded_only {
         // A point that is not in use bears nothing.
         stays = normal_0.select_positive(normal_1.select_positive(stays, zero), zero);
@@ -242,15 +238,15 @@ pub(super) fn follow<L: Lanes>(
             return counts;
         }
     }
-    let [nx, ny, used, _] = L::gather_quads::<RECORD, HEADER>(quads, target);
+    let [nx, ny, used, _] = L::gather_shared::<_, RECORD, HEADER>(contacts, target);
     let turns = Turns::since([a_0, b_0], &poses);
     let gap = |[ax, ay, bx, by]: [L; 4]| turns.gap(&poses, [nx, ny], [ax, ay], [bx, by]);
-    let new_0 = s_0 + gap(L::gather_quads::<RECORD, ANCHORS_0>(quads, target));
-    let new_1 = s_1 + gap(L::gather_quads::<RECORD, ANCHORS_1>(quads, target));
+    let new_0 = s_0 + gap(L::gather_shared::<_, RECORD, ANCHORS_0>(contacts, target));
+    let new_1 = s_1 + gap(L::gather_shared::<_, RECORD, ANCHORS_1>(contacts, target));
     let new_0 = stays.select_positive(new_0, separation_0);
     let new_1 = used.select_equal(two, stays.select_positive(new_1, separation_1), separation_1);
-    L::scatter_quads::<RECORD, STATE_0>(quads, target, [new_0, id_0, normal_0, tangent_0]);
-    L::scatter_quads::<RECORD, STATE_1>(quads, target, [new_1, id_1, normal_1, tangent_1]);
+    L::scatter_shared::<_, RECORD, STATE_0>(contacts, target, [new_0, id_0, normal_0, tangent_0]);
+    L::scatter_shared::<_, RECORD, STATE_1>(contacts, target, [new_1, id_1, normal_1, tangent_1]);
     let count = stays.select_positive(used.select_equal(two, L::splat(2.0), one), zero);
     counts[..L::WIDTH].copy_from_slice(bytemuck::cast_slice(&[count]));
     counts

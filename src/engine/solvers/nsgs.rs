@@ -42,16 +42,16 @@ use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, TURN, arms, separation, spin, to_frame, turn, with_arms,
 };
 use crate::constraints::kernels::pass::{Pass, PassInput};
-use crate::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
+use crate::constraints::kernels::stages::{PairState, Stages, in_stages, over_colors};
 use crate::constraints::kernels::velocity::rules::{Baumgarte, NormalRule, Softness};
 use crate::constraints::kernels::velocity::sweep::Sweep;
 use crate::constraints::numerics::cone;
-use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::records::batches::{Batches, SegmentRecords};
 use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
 use crate::constraints::{Passes, Schedule};
-use crate::lanes::{BodyRow, Lanes};
+use crate::lanes::{Lanes, SharedRows};
 use crate::params::Parameter;
 
 /// See the [module](self).
@@ -91,23 +91,22 @@ impl<R: NormalRule> Pass for ConeSweep<R> {
 
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
-        sweep::<L, F, R>(on.rows, on.batches, self.0);
+        sweep::<L, F, R>(SharedRows::among(on.rows, on.workers), on.batches, self.0);
     }
 }
 
 #[inline(never)]
-fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule>(rows: &mut [BodyRow], batches: &mut Batches, rule: R) {
-    over_segments!(segment, L, N, R; rows, batches, rule);
+fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule>(rows: SharedRows<'_>, batches: &mut Batches, rule: R) {
+    over_colors!(segment, L, N, R; rows, batches, rule);
 }
 
 #[inline(always)]
 fn segment<L: Lanes, N: KernelFeatures, O: Partner, R: NormalRule>(
-    rows: &mut [BodyRow],
-    batches: &mut Batches,
-    segment: &Segment,
+    mut rows: SharedRows<'_>,
+    of: SegmentRecords<'_, L>,
     rule: R,
 ) {
-    in_stages::<L, N, O, _, _>(rows, batches, segment, PointByPoint(rule));
+    in_stages::<L, N, O, _, _>(&mut rows, of, PointByPoint(rule));
 }
 
 /// The sweep as a kernel: points one after the other, each exactly.

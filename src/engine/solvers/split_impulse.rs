@@ -88,8 +88,8 @@ fn with_pseudo_velocities(
     before.clone_from(rows);
     rows.iter_mut().for_each(|row| row.velocity[..3].fill(0.0));
     solve(passes);
-    passes.over_bodies(Phase::Position, |rows, motion| {
-        motion.advance(rows);
+    passes.over_bodies(Phase::Position, |rows, motion, workers| {
+        motion.advance(rows, workers);
         for (row, before) in rows.iter_mut().zip(before.iter()) {
             row.velocity = before.velocity;
         }

@@ -85,7 +85,7 @@ impl Solver for Xpbd {
                 passes.run(Phase::Restitution, &mut Approach { to });
             }
             passes.integrate_positions();
-            passes.over_bodies(Phase::Integrate, |rows, motion| {
+            passes.over_bodies(Phase::Integrate, |rows, motion, _| {
                 before.clone_from(rows);
                 motion.hidden_turns(before);
             });
@@ -95,7 +95,7 @@ impl Solver for Xpbd {
                 passes.count_sweep(passes.rows_per_point());
                 passes.iteration_done();
             }
-            passes.over_bodies(Phase::Integrate, |rows, _| velocities(rows, before, 1.0 / h));
+            passes.over_bodies(Phase::Integrate, |rows, _, _| velocities(rows, before, 1.0 / h));
             let rebounds = passes.parts_of(rebounds);
             passes.run(Phase::Solve, &mut AfterDisplacing { rebounds });
             passes.count_sweep(passes.rows_per_point());

@@ -47,6 +47,9 @@ pub(super) struct Narrow {
 /// ahead.
 const AHEAD: f32 = 1.25;
 
+/// Least number of bodies that are worth a thread.
+const LEAST_BODIES: usize = 512;
+
 /// `Candidate::contact` of a pair that has just begun to touch: this bit and the index in `fresh`.
 const FRESH: u32 = 1 << 31;
 
@@ -67,31 +70,38 @@ impl World {
         if self.settings.record_impulses || self.settings.contact_events {
             self.contacts.iter_mut().for_each(|c| c.step_impulse = Default::default());
         }
-        let bodies = &self.bodies;
-        narrow.poses.clear();
-        narrow.poses.extend(narrow.extents.iter().enumerate().map(|(i, &extent)| PoseRow {
-            position: [
-                bodies.position_x[i],
-                bodies.position_y[i],
-                bodies.position_x_lo[i],
-                bodies.position_y_lo[i],
-            ],
-            rotation: [
-                bodies.rotation_cos[i],
-                bodies.rotation_sin[i],
-                f32::from(u8::from(!bodies.is_dynamic(i))),
-                extent,
-            ],
-        }));
+        let (bodies, dt) = (&self.bodies, AHEAD * self.settings.dt);
+        let Narrow { poses, displacements, extents, .. } = narrow;
+        poses.resize(extents.len(), PoseRow::default());
+        displacements.resize(extents.len(), Quad([0.0; 4]));
+        let workers = &self.work.workers;
+        let size = workers.part(poses.len(), LEAST_BODIES);
+        let parts = poses.chunks_mut(size).zip(displacements.chunks_mut(size)).enumerate();
+        workers.each(parts, |(part, (poses, displacements))| {
+            for (i, (pose, displacement)) in (part * size..).zip(poses.iter_mut().zip(displacements)) {
+                *pose = PoseRow {
+                    position: [
+                        bodies.position_x[i],
+                        bodies.position_y[i],
+                        bodies.position_x_lo[i],
+                        bodies.position_y_lo[i],
+                    ],
+                    rotation: [
+                        bodies.rotation_cos[i],
+                        bodies.rotation_sin[i],
+                        f32::from(u8::from(!bodies.is_dynamic(i))),
+                        extents[i],
+                    ],
+                };
+                let [x, y, turn] =
+                    [&bodies.velocity_x, &bodies.velocity_y, &bodies.angular_velocity].map(|v| dt * v[i]);
+                *displacement = Quad([x, y, turn, 0.0]);
+            }
+        });
         let freezing = self.settings.freezing();
         if freezing.is_some() {
             narrow.found.resize(self.contacts.len(), Found::NEVER);
         }
-        narrow.displacements.clear();
-        let dt = AHEAD * self.settings.dt;
-        narrow.displacements.extend((0..bodies.len()).map(|i| {
-            Quad([dt * bodies.velocity_x[i], dt * bodies.velocity_y[i], dt * bodies.angular_velocity[i], 0.0])
-        }));
         let mut asked = Collision::default();
         self.with_scene(|solver, scene| solver.before_collision(scene, &mut asked));
         let narrow = &mut self.narrow;
@@ -127,7 +137,8 @@ impl World {
         };
         // `displacements` covers more than a step.
         let rolling = asked.rolling.map(|Rolling { limit }| Rolling { limit: AHEAD * limit });
-        let input = Input { poses, displacements, rolling, shapes, margins, freezing };
+        let workers = &self.work.workers;
+        let input = Input { poses, displacements, rolling, shapes, margins, freezing, workers };
         let (mut points, width, contacts) = (0, self.settings.widths()[1], &mut self.contacts);
         for (kind, jobs) in PairKind::ALL.into_iter().zip(jobs) {
             points += batch::update(kind, width, jobs, input, contacts, found, &mut change);

@@ -120,6 +120,8 @@ pub struct World {
     /// Whether static bodies came, went or were moved since `seams` were found.
     seams_are_stale: bool,
     assignment: Assignment,
+    /// Scratch memory of [`Batches::check_disjoint`](crate::constraints::records::batches::Batches::check_disjoint).
+    seen_rows: Vec<u32>,
     continuous: Continuous,
     /// Whether bodies were added or removed since `continuous` was built.
     continuous_is_stale: bool,
@@ -173,6 +175,7 @@ impl World {
             seams: Seams::default(),
             seams_are_stale: true,
             assignment: Assignment::default(),
+            seen_rows: Vec::new(),
             continuous: Continuous::default(),
             continuous_is_stale: true,
             lanes_are_for: None,
@@ -207,6 +210,7 @@ impl World {
     pub fn step(&mut self) -> Result<(), StepError> {
         self.settings.check().map_err(StepError::Settings)?;
         let mut clock = Clock::start(self.settings.timed);
+        self.work.workers.set(self.settings.threads);
         self.solve(&mut clock);
         self.store();
         clock.lap(Phase::Store);
@@ -261,7 +265,7 @@ impl World {
             };
             self.counts.fast = self.continuous.shorten(moving, rows);
         }
-        motion::store(&mut self.bodies, &self.work.rows, self.features.rotation);
+        motion::store(&mut self.bodies, &self.work.rows, self.features.rotation, &self.work.workers);
     }
 
     /// Runs every phase of a step, pairs included, without moving the bodies, so that phases can be measured
@@ -270,6 +274,7 @@ impl World {
     pub fn frozen_step(&mut self) {
         let mut clock = Clock::start(self.settings.timed);
         self.pairs_are_stale = true;
+        self.work.workers.set(self.settings.threads);
         self.solve(&mut clock);
         self.timings = clock.stop();
     }
@@ -311,6 +316,9 @@ impl World {
         }
         clock.lap(Phase::Collide);
         self.assign_lanes(&self.kernel_features());
+        if self.work.workers.count() > 1 && !self.work.lanes.is_checked() {
+            self.work.lanes.check_disjoint(self.bodies.len() as u32, &mut self.seen_rows);
+        }
         clock.lap(Phase::Color);
         self.load_rows();
         clock.lap(Phase::Prepare);
@@ -329,9 +337,9 @@ impl World {
             integrator: s.integrator,
             rotation: s.rotation,
         };
-        self.work.motion.load(&self.bodies, &mut self.work.rows, &motion);
         let h = self.settings.h();
-        let Workspace { types, poses, .. } = &mut self.work;
+        let Workspace { rows, motion: of_rows, types, poses, workers, .. } = &mut self.work;
+        of_rows.load(&self.bodies, rows, &motion, workers);
         if !types.is_empty() {
             poses.clear();
             poses.extend_from_slice(self.narrow.poses());

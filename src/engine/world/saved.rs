@@ -22,6 +22,11 @@ pub(super) fn one() -> f32 {
     1.0
 }
 
+/// Default number of threads of saved settings.
+pub(super) fn one_thread() -> usize {
+    1
+}
+
 /// A solver by its name. Errors: an unknown one.
 pub(super) mod solver {
     use super::*;

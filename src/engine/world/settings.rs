@@ -115,6 +115,10 @@ pub struct Settings {
     /// Continuous collision: stop fast bodies at surfaces that they would otherwise pass through, see
     /// [`crate::continuous`].
     pub continuous: bool,
+    /// Threads that share a step, the calling one included; 0 counts as 1, and there are at most
+    /// [`MOST_THREADS`](crate::workers::MOST_THREADS). Every number gives the same bits. Small scenes use one.
+    #[cfg_attr(feature = "serde", serde(default = "super::saved::one_thread"))]
+    pub threads: usize,
     /// Extra kernel features to compile in, to measure their cost.
     pub extra_features: Features,
 }
@@ -144,6 +148,7 @@ impl Settings {
             integrator: Integrator::default(),
             rotation: RotationUpdate::default(),
             continuous: solver.continuous,
+            threads: 1,
             extra_features: Features::NONE,
         }
     }

@@ -192,7 +192,7 @@ impl<'a> Replay<'a> {
         };
         let mut work = Workspace::default();
         let mut rows = Vec::new();
-        work.motion.load(&bodies, &mut rows, &motion);
+        work.motion.load(&bodies, &mut rows, &motion, &work.workers);
         setup::check_range(h, &rows, &contacts)?;
         let order = sequence.order(problem.joints.len());
         let joints = FrozenJoints::new(problem, &order, &bodies, problem.bodies.len() as u32, h)?;

@@ -6,6 +6,7 @@ use crate::engine::contacts::Manifold;
 use crate::engine::narrowphase::collide;
 use crate::engine::params::SPECULATIVE_DISTANCE;
 use crate::engine::shapes::Pose;
+use crate::engine::workers::Workers;
 use crate::engine::world::World;
 use glam::{DVec2, Vec2};
 
@@ -42,7 +43,7 @@ impl Overlaps {
         };
         self.proxies.clear();
         self.proxies.extend(world.shapes().iter().zip(world.shape_body()).map(proxy));
-        self.broadphase.pairs(&self.proxies, &mut self.pairs);
+        self.broadphase.pairs(&self.proxies, &mut self.pairs, &Workers::default());
         for &[i, j] in &self.pairs {
             let [a, b] = if self.proxies[j as usize].dynamic { [i, j] } else { [j, i] };
             let [body_a, body_b] = [a, b].map(|s| world.shape_body()[s as usize] as usize);

@@ -96,7 +96,7 @@ fn begin<L: Lanes>(
     contacts: &[Contact],
     to: &mut FindBounces,
 ) {
-    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
+    let SegmentRecords { records, contact, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
     let indices = contact.batches::<L::Index>().zip(row_a.batches().zip(row_b.batches()));
     let records = records.chunks_exact_mut(layout.stride).zip(bounces.of::<L>(segment));
     let (zero, h) = (L::zero(), L::splat(to.h));

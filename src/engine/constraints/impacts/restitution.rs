@@ -98,7 +98,7 @@ fn prepare_segment<L: Lanes>(
     rebound: Rebound,
 ) -> f32 {
     let mut most = L::zero();
-    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
+    let SegmentRecords { records, contact, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact(layout.stride).zip(row_a.batches().zip(row_b.batches()));
     let sides = bounces.of::<L>(segment);
     for (batch, (bounce, (record, (row_a, row_b)))) in sides.zip(records).enumerate() {

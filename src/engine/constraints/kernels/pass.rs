@@ -11,6 +11,7 @@ use crate::constraints::records::features::{Features, Kernel, KernelFeatures};
 use crate::constraints::records::kept::SolverState;
 use crate::contacts::Contact;
 use crate::lanes::{BodyRow, LaneWidth, Lanes};
+use crate::workers::Workers;
 
 /// Input of a pass: the rows of all bodies and one set of batches.
 pub struct PassInput<'a> {
@@ -26,6 +27,8 @@ pub struct PassInput<'a> {
     pub contacts: &'a mut [Contact],
     /// Values that the solver keeps per contact, per contact point and per body.
     pub kept: &'a mut SolverState,
+    /// Threads that may share the pass.
+    pub workers: &'a Workers,
     /// Velocity increments in free flight per substep, `[h aₓ, h a_y, h α, 0]` per row.
     pub increments: &'a [[f32; 4]],
 }

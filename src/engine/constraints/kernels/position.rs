@@ -26,12 +26,12 @@ use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, INV_INERTIA, INV_MASS, TURN, arms, spin, to_frame, turn, with_arms,
 };
 use crate::constraints::kernels::pass::{Pass, PassInput, PassMode};
-use crate::constraints::kernels::stages::{for_each_batch, over_segments};
-use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::kernels::stages::{for_each_batch, over_colors};
+use crate::constraints::records::batches::{Batches, SegmentRecords};
 use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
-use crate::lanes::{BodyRow, Lanes};
+use crate::lanes::{Lanes, SharedRows};
 
 /// One sweep; see the [module](self).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,20 +53,20 @@ impl Pass for PositionSweep {
     }
 
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
-        position_sweep::<L, F>(on.rows, on.batches, *self);
+        position_sweep::<L, F>(SharedRows::among(on.rows, on.workers), on.batches, *self);
     }
 }
 
 /// One position sweep over a segment.
 #[inline(always)]
 fn position_segment<L: Lanes, N: KernelFeatures, O: Partner>(
-    rows: &mut [BodyRow],
-    batches: &mut Batches,
-    segment: &Segment,
+    mut rows: SharedRows<'_>,
+    of: SegmentRecords<'_, L>,
     sweep: PositionSweep,
 ) {
     let layout = const { Layout::of::<N, O>() };
-    for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
+    let pushes_a = of.segment.pushes_a();
+    for_each_batch::<L, N, O, _>(&mut rows, of, |rows, record, row_a, row_b| {
         let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
         let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
@@ -104,11 +104,11 @@ fn position_segment<L: Lanes, N: KernelFeatures, O: Partner>(
         let (x, y) = (n[0] * sum, n[1] * sum);
         b[DX] = b[INV_MASS].mul_add(x, b[DX]);
         b[DY] = b[INV_MASS].mul_add(y, b[DY]);
-        L::scatter_delta(rows, row_b, [b[DX], b[DY], angle[1], b[INV_INERTIA]]);
-        if O::HAS_ROW && segment.pushes_a() {
+        L::scatter_shared::<_, 2, 1>(*rows, row_b, [b[DX], b[DY], angle[1], b[INV_INERTIA]]);
+        if O::HAS_ROW && pushes_a {
             a[DX] = a[INV_MASS].neg_mul_add(x, a[DX]);
             a[DY] = a[INV_MASS].neg_mul_add(y, a[DY]);
-            L::scatter_delta(rows, row_a, [a[DX], a[DY], angle[0], a[INV_INERTIA]]);
+            L::scatter_shared::<_, 2, 1>(*rows, row_a, [a[DX], a[DY], angle[0], a[INV_INERTIA]]);
         }
     });
 }
@@ -116,9 +116,9 @@ fn position_segment<L: Lanes, N: KernelFeatures, O: Partner>(
 /// One position sweep over all segments, in order.
 #[inline(never)]
 pub fn position_sweep<L: Lanes, N: KernelFeatures>(
-    rows: &mut [BodyRow],
+    rows: SharedRows<'_>,
     batches: &mut Batches,
     sweep: PositionSweep,
 ) {
-    over_segments!(position_segment, L, N; rows, batches, sweep);
+    over_colors!(position_segment, L, N; rows, batches, sweep);
 }

@@ -2,13 +2,13 @@
 //! end.
 
 use crate::constraints::kernels::pass::{Pass, PassInput};
-use crate::constraints::kernels::stages::over_segments;
+use crate::constraints::kernels::stages::over_colors;
 use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
 use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
 use crate::contacts::{Contact, quad};
-use crate::lanes::{BodyRow, Lanes, Quad, prefetch_records};
+use crate::lanes::{Lanes, Quad, SharedRows, prefetch_records};
 
 const INV_MASS: usize = 3;
 const INV_INERTIA: usize = 7;
@@ -25,15 +25,14 @@ const AHEAD: usize = 2;
 /// impulse. Their impulse stays zero at any velocity.
 #[inline(always)]
 fn prepare_segment<L: Lanes, N: KernelFeatures, O: Partner>(
-    rows: &mut [BodyRow],
-    batches: &mut Batches,
-    segment: &Segment,
+    rows: SharedRows<'_>,
+    of: SegmentRecords<'_, L>,
     contacts: &[Contact],
 ) {
     use quad::*;
     let layout = const { Layout::of::<N, O>() };
     let quads: &[Quad] = bytemuck::cast_slice(contacts);
-    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, &layout);
+    let SegmentRecords { segment, records, contact, row_a, row_b } = of;
     let records = records.chunks_exact_mut(layout.stride);
     let indices = contact.batches().zip(row_a.batches().zip(row_b.batches()));
     for (batch, (record, (index, (row_a, row_b)))) in records.zip(indices).enumerate() {
@@ -48,8 +47,8 @@ fn prepare_segment<L: Lanes, N: KernelFeatures, O: Partner>(
             floats[filled..].fill(0.0);
         }
         let [nx, ny, count, friction] = L::gather_quads::<STRIDE, HEADER>(quads, index);
-        let a = if O::HAS_ROW { L::gather(rows, row_a) } else { [L::zero(); 8] };
-        let b = L::gather(rows, row_b);
+        let a = if O::HAS_ROW { L::gather_shared_rows(rows, row_a) } else { [L::zero(); 8] };
+        let b = L::gather_shared_rows(rows, row_b);
         let filled = |value: L| present.select_positive(value, L::zero());
         (record[0], record[1]) = (filled(nx), filled(ny));
         if N::FRICTION {
@@ -112,18 +111,18 @@ pub struct Prepare;
 impl Pass for Prepare {
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
-        prepare::<L, F>(on.rows, on.batches, on.contacts);
+        prepare::<L, F>(SharedRows::among(on.rows, on.workers), on.batches, on.contacts);
     }
 }
 
 /// Fills the records of all segments.
 #[inline(never)]
 pub fn prepare<L: Lanes, N: KernelFeatures>(
-    rows: &mut [BodyRow],
+    rows: SharedRows<'_>,
     batches: &mut Batches,
     contacts: &[Contact],
 ) {
-    over_segments!(prepare_segment, L, N; rows, batches, contacts);
+    over_colors!(prepare_segment, L, N; rows, batches, contacts);
 }
 
 /// Writes accumulated impulses back to the contacts.

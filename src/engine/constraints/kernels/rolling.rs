@@ -78,7 +78,7 @@ fn roll<L: Lanes>(
     let (tau, steady) = (L::splat(middle), L::splat(steady / dt));
     // The point is on b's surface if a is held, else in the middle of the gap.
     let of_gap = L::splat(if segment.pushes_a() { 0.5 } else { 0.0 });
-    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
+    let SegmentRecords { records, contact, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
     let indices = contact.batches::<L::Index>().zip(row_a.batches::<L::Index>().zip(row_b.batches()));
     let records = records.chunks_exact_mut(layout.stride).zip(indices);
     for (record, (contact, (row_a, row_b))) in records {

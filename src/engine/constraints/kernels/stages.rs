@@ -7,10 +7,15 @@
 //! processed together. At sixteen lanes batches are processed one by one, and so are segments of fewer than eight
 //! batches. Gathering and forming rows are one stage: separate ones would store and load the bodies once more.
 
+#![allow(
+    unsafe_code,
+    reason = "threads that share the rows of a color, which `Batches::check_disjoint` has checked"
+)]
+
 use crate::constraints::kernels::frame::{BodyPair, INV_INERTIA, INV_MASS, VX, VY, W, apply, to_frame};
-use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::batches::{Batches, Segment, SegmentRecords, TOGETHER};
 use crate::constraints::records::features::{KernelFeatures, Layout, Partner};
-use crate::lanes::{LaneIndex, Lanes, RowStore, align_frame, prefetch};
+use crate::lanes::{LaneIndex, Lanes, RowStore, SharedRows, align_frame, prefetch};
 
 /// Runs `$kernel::<L, N, O, …>` over every segment, with `O` chosen by the segment.
 macro_rules! over_segments {
@@ -19,13 +24,72 @@ macro_rules! over_segments {
         for i in 0..$batches.visits().len() {
             let segment = $batches.visits()[i];
             match segment.partner {
-                PartnerKind::Static => $kernel::<$l, $n, OnStatic $(, $r)*>($rows, $batches, &segment $(, $arg)*),
-                _ => $kernel::<$l, $n, OnMoving $(, $r)*>($rows, $batches, &segment $(, $arg)*),
+                PartnerKind::Static => {
+                    let records = $batches.records_of::<$l>(&segment, &const { $crate::constraints::records::features::Layout::of::<$n, OnStatic>() });
+                    $kernel::<$l, $n, OnStatic $(, $r)*>($rows, records $(, $arg)*)
+                }
+                _ => {
+                    let records = $batches.records_of::<$l>(&segment, &const { $crate::constraints::records::features::Layout::of::<$n, OnMoving>() });
+                    $kernel::<$l, $n, OnMoving $(, $r)*>($rows, records $(, $arg)*)
+                }
             }
         }
     };
 }
 pub(crate) use over_segments;
+
+/// As [`over_segments`], with rows that threads share ([`SharedRows`]): each takes a part of a color.
+macro_rules! over_colors {
+    ($kernel:ident, $l:ty, $n:ty $(, $r:tt)*; $rows:expr, $batches:expr $(, $arg:expr)*) => {
+        for i in 0..$batches.visits().len() {
+            let segment = $batches.visits()[i];
+            match segment.partner {
+                PartnerKind::Static => $crate::constraints::kernels::stages::over_color::<$l, $n, OnStatic>(
+                    $rows,
+                    $batches,
+                    &segment,
+                    |rows, records| $kernel::<$l, $n, OnStatic $(, $r)*>(rows, records $(, $arg)*),
+                ),
+                _ => $crate::constraints::kernels::stages::over_color::<$l, $n, OnMoving>(
+                    $rows,
+                    $batches,
+                    &segment,
+                    |rows, records| $kernel::<$l, $n, OnMoving $(, $r)*>(rows, records $(, $arg)*),
+                ),
+            }
+        }
+    };
+}
+pub(crate) use over_colors;
+
+/// Runs a kernel on a segment: on parts of it in several threads, if it is a color and large enough.
+#[inline(always)]
+pub(crate) fn over_color<L: Lanes, N: KernelFeatures, O: Partner>(
+    rows: SharedRows<'_>,
+    batches: &mut Batches,
+    segment: &Segment,
+    kernel: impl Fn(SharedRows<'_>, SegmentRecords<'_, L>) + Sync,
+) {
+    let count = if segment.disjoint && batches.is_checked() { rows.parts(segment.contacts) } else { 1 };
+    let records = batches.records_of::<L>(segment, &const { Layout::of::<N, O>() });
+    if count == 1 {
+        return in_frame(&kernel, rows, records);
+    }
+    // SAFETY: `check_disjoint`: no two lanes of the segment push the same row, apart from the inert one, and that one is
+    // in the lanes at the end of the last batch, so in one part. Rows that are not pushed are not written.
+    unsafe { rows.share(records.into_parts(count), |rows, records| in_frame(&kernel, rows, records)) };
+}
+
+/// One instance of a kernel, for parts and for whole segments.
+#[inline(never)]
+fn in_frame<L: Lanes>(
+    kernel: &impl Fn(SharedRows<'_>, SegmentRecords<'_, L>),
+    rows: SharedRows<'_>,
+    records: SegmentRecords<'_, L>,
+) {
+    align_frame();
+    kernel(rows, records);
+}
 
 /// Prefetch distance of records, in batches, for records that come from memory.
 const PREFETCH_BATCHES: usize = 4;
@@ -34,12 +98,11 @@ const PREFETCH_BATCHES: usize = 4;
 #[inline(always)]
 pub(crate) fn for_each_batch<L: Lanes, N: KernelFeatures, O: Partner, S: RowStore + ?Sized>(
     rows: &mut S,
-    batches: &mut Batches,
-    segment: &Segment,
+    of: SegmentRecords<'_, L>,
     mut visit: impl FnMut(&mut S, &mut [L], LaneIndex<L::Index>, LaneIndex<L::Index>),
 ) {
     let layout = const { Layout::of::<N, O>() };
-    let SegmentRecords { mut records, row_a, row_b, .. } = batches.records_of::<L>(segment, &layout);
+    let SegmentRecords { mut records, row_a, row_b, .. } = of;
     rows.assert_rows(row_b);
     if O::HAS_ROW {
         rows.assert_rows(row_a);
@@ -127,12 +190,9 @@ pub(crate) trait Stages<L: Lanes, N: KernelFeatures, O: Partner>: Copy {
     fn solve(self, begun: &Self::Partial, record: &mut [L], state: &mut PairState<L>);
 }
 
-/// Number of batches that go through the stages together.
-const GROUP: usize = 8;
-
 /// Runs a kernel over a segment, all contacts of a batch at once.
 #[inline(always)]
-pub(crate) fn in_stages<L, N, O, K, S>(rows: &mut S, batches: &mut Batches, segment: &Segment, kernel: K)
+pub(crate) fn in_stages<L, N, O, K, S>(rows: &mut S, of: SegmentRecords<'_, L>, kernel: K)
 where
     L: Lanes,
     N: KernelFeatures,
@@ -140,11 +200,12 @@ where
     K: Stages<L, N, O>,
     S: RowStore + ?Sized,
 {
-    if const { L::WIDTH > 1 && L::WIDTH < 16 } && segment.disjoint && segment.batches >= GROUP {
-        return together::<L, N, O, K, S>(rows, batches, segment, kernel);
+    let segment = of.segment;
+    if const { L::WIDTH > 1 && L::WIDTH < 16 } && segment.disjoint && segment.batches >= TOGETHER {
+        return together::<L, N, O, K, S>(rows, of, kernel);
     }
     let pushes_a = segment.pushes_a();
-    for_each_batch::<L, N, O, S>(rows, batches, segment, |rows, record, row_a, row_b| {
+    for_each_batch::<L, N, O, S>(rows, of, |rows, record, row_a, row_b| {
         let bodies = BodyPair::gather::<O, S>(rows, row_a, row_b);
         let (mut state, mut begun) = (PairState::zero(), K::empty());
         state.read(&bodies);
@@ -154,10 +215,10 @@ where
     });
 }
 
-/// Runs `GROUP` batches together. The bits are the same as batch by batch, since no two contacts of the
+/// Runs `TOGETHER` batches together. The bits are the same as batch by batch, since no two contacts of the
 /// segment push the same body.
 #[inline(never)]
-fn together<L, N, O, K, S>(rows: &mut S, batches: &mut Batches, segment: &Segment, kernel: K)
+fn together<L, N, O, K, S>(rows: &mut S, of: SegmentRecords<'_, L>, kernel: K)
 where
     L: Lanes,
     N: KernelFeatures,
@@ -168,15 +229,15 @@ where
     align_frame();
     let layout = const { Layout::of::<N, O>() };
     let stride = layout.stride;
+    let SegmentRecords { segment, mut records, row_a, row_b, .. } = of;
     let pushes_a = segment.pushes_a();
-    let SegmentRecords { mut records, row_a, row_b, .. } = batches.records_of::<L>(segment, &layout);
     rows.assert_rows(row_b);
     if O::HAS_ROW {
         rows.assert_rows(row_a);
     }
-    let mut group = [(PairState::<L>::zero(), K::empty()); GROUP];
-    for first in (0..segment.batches).step_by(GROUP) {
-        let count = GROUP.min(segment.batches - first);
+    let mut group = [(PairState::<L>::zero(), K::empty()); TOGETHER];
+    for first in (0..segment.batches).step_by(TOGETHER) {
+        let count = TOGETHER.min(segment.batches - first);
         let lanes = first * L::WIDTH..(first + count) * L::WIDTH;
         let (row_a, row_b) = (row_a.part(lanes.clone()), row_b.part(lanes));
         let bodies = || row_a.batches::<L::Index>().zip(row_b.batches::<L::Index>());

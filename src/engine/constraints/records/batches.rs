@@ -36,10 +36,14 @@ pub struct Batches {
     vectors: usize,
     /// Slots in vectors over contact points.
     slots: usize,
+    /// Whether [`Self::check_disjoint`] has checked the rows.
+    is_checked: bool,
 }
 
-/// The records of a segment, and the indices by which its lanes gather.
+/// The records of a segment or of a part of it, and the indices by which its lanes gather.
 pub struct SegmentRecords<'a, L> {
+    /// What they are records of.
+    pub segment: Segment,
     /// `[batches × stride]`
     pub records: &'a mut [L],
     /// `[batches × width]`
@@ -48,6 +52,35 @@ pub struct SegmentRecords<'a, L> {
     pub row_a: IndexList<'a>,
     /// `[batches × width]`
     pub row_b: IndexList<'a>,
+}
+
+impl<'a, L: Lanes> SegmentRecords<'a, L> {
+    /// The records in `parts` parts of whole batches; fewer if there are not as many.
+    pub(crate) fn into_parts(self, parts: usize) -> impl Iterator<Item = Self> {
+        let SegmentRecords { segment, mut records, contact, row_a, row_b } = self;
+        let whole = if L::WIDTH < 16 { TOGETHER } else { 1 };
+        let each = segment.batches.div_ceil(parts).next_multiple_of(whole).max(1);
+        (0..segment.batches).step_by(each).map(move |first| {
+            let batches = each.min(segment.batches - first);
+            let (own, rest) = std::mem::take(&mut records).split_at_mut(batches * segment.stride);
+            records = rest;
+            let lanes = first * L::WIDTH..(first + batches) * L::WIDTH;
+            SegmentRecords {
+                segment: Segment {
+                    first_lane: segment.first_lane + lanes.start,
+                    contacts: segment.contacts.saturating_sub(lanes.start).min(lanes.len()),
+                    batches,
+                    first_slot: segment.first_slot + lanes.start,
+                    first_vector: segment.first_vector + first * segment.stride,
+                    ..segment
+                },
+                records: own,
+                contact: contact.part(lanes.clone()),
+                row_a: row_a.part(lanes.clone()),
+                row_b: row_b.part(lanes),
+            }
+        })
+    }
 }
 
 /// A record of constraints of any type.
@@ -96,6 +129,9 @@ impl Part {
         }
     }
 }
+
+/// Number of batches of fewer than 16 lanes that kernels process together.
+pub(crate) const TOGETHER: usize = 8;
 
 /// Contacts are appended in chunks of this size, because the bound of an index list is computed in lanes.
 const PART: usize = 64;
@@ -208,6 +244,32 @@ impl Batches {
         self.row_a.clear();
         self.row_b.clear();
         (self.vectors, self.slots) = (0, 0);
+        self.is_checked = false;
+    }
+
+    /// Checks that no two lanes of a disjoint segment push the same row, apart from the `inert` one. Parts of the segments
+    /// may then run in several threads ([`Self::is_checked`]). `seen` is scratch memory.
+    ///
+    /// # Panics
+    /// If they do.
+    pub(crate) fn check_disjoint(&mut self, inert: u32, seen: &mut Vec<u32>) {
+        seen.clear();
+        seen.resize(inert as usize + 1, 0);
+        for (number, segment) in (1..).zip(&self.segments).filter(|(_, segment)| segment.disjoint) {
+            let lanes = segment.first_lane..segment.first_lane + segment.contacts;
+            let pushed_a = if segment.pushes_a() { lanes.clone() } else { 0..0 };
+            for &row in self.row_a[pushed_a].iter().chain(&self.row_b[lanes]) {
+                let last = std::mem::replace(&mut seen[row as usize], number);
+                assert!(last != number, "row {row} twice in one color");
+            }
+        }
+        self.is_checked = true;
+    }
+
+    /// Whether rows of disjoint segments are known to be distinct; see [`Self::check_disjoint`].
+    #[inline(always)]
+    pub(crate) fn is_checked(&self) -> bool {
+        self.is_checked
     }
 
     /// Appends one segment of contacts, each with the rows of its bodies a and b. Padding lanes point at the
@@ -237,6 +299,7 @@ impl Batches {
         inert: u32,
     ) {
         assert!(self.width > 0, "batches without lanes: `clear` gives them their width");
+        self.is_checked = false;
         let first_lane = self.contact.len();
         let mut contacts = contacts;
         let mut part = [[0; PART]; 3];
@@ -343,6 +406,7 @@ impl Batches {
         let buffer: &mut [L] = bytemuck::cast_slice_mut(&mut self.buffer);
         assert!(vectors.end <= buffer.len(), "no room for records: `reserve_buffer` makes it");
         SegmentRecords {
+            segment: *segment,
             records: &mut buffer[vectors],
             contact: self.contact.list().part(lanes.clone()),
             row_a: self.row_a.list().part(lanes.clone()),

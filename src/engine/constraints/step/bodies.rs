@@ -6,6 +6,7 @@ use crate::constraints::kernels::motion::Motion;
 use crate::constraints::kernels::velocity::masses::{EffectiveMasses, ScaledMasses};
 use crate::constraints::records::graph::Graph;
 use crate::lanes::BodyRow;
+use crate::workers::Workers;
 
 impl Passes<'_> {
     /// Time for which bodies move with the velocities of [`Self::integrate_velocities`] (s): h, or 0 if they
@@ -15,22 +16,27 @@ impl Passes<'_> {
     }
 
     /// Runs a body pass of the solver's own, on the rows and on their motion, booked on `phase`.
-    pub fn over_bodies(&mut self, phase: Phase, pass: impl FnOnce(&mut Vec<BodyRow>, &mut Motion)) {
-        pass(&mut self.work.rows, &mut self.work.motion);
+    /// Threads may share it.
+    pub fn over_bodies(&mut self, phase: Phase, pass: impl FnOnce(&mut Vec<BodyRow>, &mut Motion, &Workers)) {
+        pass(&mut self.work.rows, &mut self.work.motion, &self.work.workers);
         self.clock.lap(phase);
     }
 
     /// Body pass: v ← damped v + h a.
     pub fn integrate_velocities(&mut self) {
         self.driven = false;
-        self.over_bodies(Phase::Integrate, |rows, motion| motion.integrate_velocities(rows));
+        self.over_bodies(Phase::Integrate, |rows, motion, workers| {
+            motion.integrate_velocities(rows, workers)
+        });
     }
 
     /// Body pass: [`Self::integrate_velocities`] and a warm start in one. Valid from the second substep on
     /// (see [`Motion::extrapolate_velocities`]).
     pub fn integrate_and_warm_start(&mut self) {
         if self.work.types.is_empty() {
-            self.over_bodies(Phase::Integrate, |rows, motion| motion.extrapolate_velocities(rows));
+            self.over_bodies(Phase::Integrate, |rows, motion, workers| {
+                motion.extrapolate_velocities(rows, workers)
+            });
         } else {
             // Arms of joints have turned, so the last change of velocities is not a warm start.
             self.integrate_velocities();
@@ -40,12 +46,12 @@ impl Passes<'_> {
 
     /// Body pass: x ← x + h v.
     pub fn integrate_positions(&mut self) {
-        self.over_bodies(Phase::Integrate, |rows, motion| motion.integrate_positions(rows));
+        self.over_bodies(Phase::Integrate, |rows, motion, workers| motion.integrate_positions(rows, workers));
     }
 
     /// Body pass: takes the turns of round bodies out of their rows, as the integration of positions does.
     pub fn exclude_rotation_from_error(&mut self) {
-        self.over_bodies(Phase::Integrate, |rows, motion| motion.exclude_rotation_from_error(rows));
+        self.over_bodies(Phase::Integrate, |rows, motion, _| motion.exclude_rotation_from_error(rows));
     }
 
     /// Builds the contact graph, and counts the other constraints of each body.

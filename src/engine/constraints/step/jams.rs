@@ -60,7 +60,8 @@ use glam::Vec2;
 /// without bound, up to n₁ · n₂ = −(1 − µ²)/(1 + µ²), which is −1/4 with µ = 0.77.
 const OPPOSED: f32 = -0.25;
 
-/// Two contacts leave a body no room if they oppose each other and overlap by more than this together (slops).
+/// Two contacts leave a body no room if they oppose each other and overlap by more than this together (slops). One of them
+/// is then deeper than half of it.
 const NO_ROOM: f32 = 4.0;
 
 /// A contact: the bodies by which it is grouped, its index, and whether the normal keeps its sign.
@@ -73,8 +74,13 @@ pub(crate) struct Jams {
     deep: Vec<GroupedContact>,
     /// Bodies that touch a kinematic one, and how fast its surface is there (m/s).
     pressed: Vec<(u32, f32)>,
-    /// V of the squeeze that a body is in (m/s), negative if it is in none.
+    /// Dynamic bodies that deep contacts connect.
+    connected: DisjointSets,
+    /// V of the squeeze that a body is in (m/s), negative if it is in none; at the lowest index of the connected bodies.
+    /// `[bodies]`
     squeezed: Vec<f32>,
+    /// Whether a body has a contact that is deep enough for a jam. `[bodies]`
+    may_jam: Vec<bool>,
     /// Bodies in a jam of a squeeze, by number, and the bound of their speed (m/s); those of the last step until
     /// this step's are known.
     jammed: Vec<(u32, f32)>,
@@ -107,7 +113,7 @@ impl Jams {
         if !self.deep.is_empty() {
             self.hold(types, bodies);
         }
-        self.squeeze(bodies, contacts);
+        self.squeeze(bodies, contacts, slop);
         self.deep.sort_unstable();
         for group in self.deep.chunk_by(|p, q| p.0 == q.0).filter(|group| group.len() > 1) {
             let [body, same] = group[0].0;
@@ -124,7 +130,7 @@ impl Jams {
                     continue;
                 }
                 if body == same {
-                    self.jammed.push((body, self.squeezed[body as usize]));
+                    self.jammed.push((body, self.squeezed[self.connected.least(body) as usize]));
                     break;
                 }
                 forget(&mut contacts[pushing.1 as usize]);
@@ -205,33 +211,36 @@ impl Jams {
     }
 
     /// Finds the squeezes, and lists the contacts of bodies in them.
-    fn squeeze(&mut self, bodies: &Bodies, contacts: &[Contact]) {
+    fn squeeze(&mut self, bodies: &Bodies, contacts: &[Contact], slop: f32) {
         if self.deep.is_empty() || self.pressed.is_empty() {
             return;
         }
         let is_dynamic = |body: u32| bodies.is_dynamic(body as usize);
-        self.squeezed.clear();
-        self.squeezed.resize(bodies.len(), -1.0);
-        for &(body, speed) in self.pressed.iter().filter(|p| is_dynamic(p.0)) {
-            let most = &mut self.squeezed[body as usize];
-            *most = most.max(speed);
-        }
-        let mut grows = true;
-        while grows {
-            grows = false;
-            for ([a, b], ..) in &self.deep {
-                for (from, to) in [(*a, *b), (*b, *a)] {
-                    let speed = self.squeezed[from as usize];
-                    if speed > self.squeezed[to as usize] && is_dynamic(to) {
-                        (self.squeezed[to as usize], grows) = (speed, true);
-                    }
-                }
+        let Jams { deep, pressed, connected, squeezed, may_jam, .. } = self;
+        connected.begin(bodies.len());
+        may_jam.clear();
+        may_jam.resize(bodies.len(), false);
+        for pushing in &*deep {
+            // The pair of contacts of welded bodies names those that hold them.
+            let Contact { body_a, body_b, .. } = contacts[pushing.1 as usize];
+            if is_dynamic(pushing.0[0]) && is_dynamic(pushing.0[1]) {
+                connected.join(pushing.0[0], pushing.0[1]);
             }
+            if overlap(contacts, pushing).1 > 0.5 * NO_ROOM * slop {
+                (may_jam[body_a as usize], may_jam[body_b as usize]) = (true, true);
+            }
+        }
+        squeezed.clear();
+        squeezed.resize(bodies.len(), -1.0);
+        for &(body, speed) in pressed.iter().filter(|p| is_dynamic(p.0)) {
+            let most = &mut squeezed[connected.least(body) as usize];
+            *most = most.max(speed);
         }
         for (i, contact) in contacts.iter().enumerate() {
             for (own, is_own) in [(contact.body_a, false), (contact.body_b, true)] {
-                if self.squeezed[own as usize] >= 0.0 {
-                    self.deep.push(([own; 2], i as u32, is_own));
+                let mut is_squeezed = || squeezed[connected.least(own) as usize] >= 0.0;
+                if may_jam[own as usize] && is_dynamic(own) && is_squeezed() {
+                    deep.push(([own; 2], i as u32, is_own));
                 }
             }
         }

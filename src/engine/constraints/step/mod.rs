@@ -312,7 +312,7 @@ impl<'a> Passes<'a> {
 
     pub(crate) fn over_part(&mut self, part: Part, pass: &mut dyn AnyPass) {
         let width = self.width_of(part);
-        let Workspace { rows, motion, lanes, serial, impacts, kept, .. } = &mut *self.work;
+        let Workspace { rows, motion, lanes, serial, impacts, kept, workers, .. } = &mut *self.work;
         let batches = part.of(lanes, serial);
         let on = PassInput {
             rows,
@@ -320,6 +320,7 @@ impl<'a> Passes<'a> {
             part,
             bounces: &mut impacts.bounces[part as usize],
             contacts: self.contacts,
+            workers,
             increments: motion.velocity_increments(),
             kept,
         };

@@ -12,6 +12,7 @@ use crate::constraints::vectors::system::System;
 use crate::lanes::BodyRow;
 use crate::narrowphase::lanes::PoseRow;
 use crate::params::{Budget, Parameters, Without};
+use crate::workers::Workers;
 use std::fmt;
 
 /// Working data of a step. Kept from step to step, so that nothing is allocated.
@@ -41,6 +42,8 @@ pub struct Workspace {
     pub observe: bool,
     /// Rule of the last velocity sweep; see `observe`.
     pub last_rule: Option<ObservedRule>,
+    /// Threads that share the passes.
+    pub workers: Workers,
 }
 
 /// Receives the problem after each iteration of a solver. Iterations are counted from 1 in each step.
@@ -71,6 +74,7 @@ impl Clone for Workspace {
             watch: None,
             observe: self.observe,
             last_rule: self.last_rule.clone(),
+            workers: Workers::default(),
         }
     }
 }

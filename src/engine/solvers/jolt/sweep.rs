@@ -5,14 +5,14 @@ use crate::constraints::kernels::frame::{
     with_arms,
 };
 use crate::constraints::kernels::pass::{Pass, PassInput};
-use crate::constraints::kernels::stages::{for_each_batch, over_segments};
+use crate::constraints::kernels::stages::{for_each_batch, over_colors};
 use crate::constraints::kernels::velocity::rules::{NormalRule, Rigid};
 use crate::constraints::numerics::cone;
-use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::records::batches::SegmentRecords;
 use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
-use crate::lanes::{BodyRow, Lanes};
+use crate::lanes::{Lanes, SharedRows};
 
 /// One sweep. Normal rows follow the rule.
 #[derive(Clone, Copy, Debug)]
@@ -21,20 +21,20 @@ pub(super) struct ContactFriction(pub Rigid);
 impl Pass for ContactFriction {
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
-        over_segments!(sweep, L, F; on.rows, on.batches, self.0);
+        over_colors!(sweep, L, F; SharedRows::among(on.rows, on.workers), on.batches, self.0);
     }
 }
 
 #[inline(always)]
 fn sweep<L: Lanes, N: KernelFeatures, O: Partner>(
-    rows: &mut [BodyRow],
-    batches: &mut Batches,
-    segment: &Segment,
+    mut rows: SharedRows<'_>,
+    of: SegmentRecords<'_, L>,
     rule: Rigid,
 ) {
     let layout = const { Layout::of::<N, O>() };
+    let pushes_a = of.segment.pushes_a();
     let zero = L::zero();
-    for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
+    for_each_batch::<L, N, O, _>(&mut rows, of, |rows, record, row_a, row_b| {
         let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
         let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
@@ -80,7 +80,7 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Partner>(
             let vn = with_arms::<L, N, O>(along_n, w, arm);
             let at = layout.at(p, layout.normal_impulse);
             let old = record[at];
-            let new = rule.normal_impulse(!segment.pushes_a(), vn, gap, mass, old);
+            let new = rule.normal_impulse(!pushes_a, vn, gap, mass, old);
             record[at] = new;
             let delta = new - old;
             sum[0] = sum[0] + delta;
@@ -88,6 +88,6 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Partner>(
             spin::<L, N, O>(&mut w, inertia, arm, delta);
         }
         apply::<L, O>(&mut a, &mut b, n, sum, w);
-        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b, segment.pushes_a());
+        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b, pushes_a);
     });
 }

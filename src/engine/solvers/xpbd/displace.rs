@@ -31,14 +31,14 @@ use crate::constraints::kernels::frame::{
     with_arms,
 };
 use crate::constraints::kernels::pass::{Pass, PassInput, PassMode};
-use crate::constraints::kernels::stages::{for_each_batch, over_segments};
+use crate::constraints::kernels::stages::{for_each_batch, over_colors};
 use crate::constraints::numerics::cone;
-use crate::constraints::records::batches::{Batches, Segment, SegmentRecords};
+use crate::constraints::records::batches::{Batches, SegmentRecords};
 use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
 use crate::constraints::records::point_vector::places;
-use crate::lanes::{Block, BodyRow, LaneIndex, Lanes, RowStore};
+use crate::lanes::{Block, BodyRow, LaneIndex, Lanes, RowStore, SharedRows};
 use crate::params::MAX_PUSH_SPEED;
 
 /// Displaces bodies; see the [module](self).
@@ -74,7 +74,8 @@ impl Pass for Approach<'_> {
         let (to, increments): (&mut [L], _) =
             (bytemuck::cast_slice_mut(self.to[on.part as usize]), on.increments);
         on.batches.each_segment(F::layout, |batches, segment, layout| {
-            let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
+            let SegmentRecords { records, contact, row_a, row_b, .. } =
+                batches.records_of::<L>(segment, layout);
             let indices = contact.batches::<L::Index>().zip(row_a.batches().zip(row_b.batches()));
             let each = records.chunks_exact(layout.stride).zip(indices).enumerate();
             for (batch, (record, (contact, (row_a, row_b)))) in each {
@@ -105,8 +106,8 @@ impl Pass for Displace<'_> {
 
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
-        let mut store = Displaced { rows: on.rows, before: self.before };
-        over_segments!(displace, L, F; &mut store, on.batches, &*self);
+        let displace_by = *self;
+        over_colors!(displace, L, F; SharedRows::among(on.rows, on.workers), on.batches, &displace_by);
     }
 }
 
@@ -114,8 +115,10 @@ impl Pass for AfterDisplacing<'_> {
     #[inline(never)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         match &*self.rebounds[on.part as usize] {
-            [] => correct_all::<L, F, false>(on.rows, on.batches, &[]),
-            rebounds => correct_all::<L, F, true>(on.rows, on.batches, rebounds),
+            [] => correct_all::<L, F, false>(SharedRows::among(on.rows, on.workers), on.batches, &[]),
+            rebounds => {
+                correct_all::<L, F, true>(SharedRows::among(on.rows, on.workers), on.batches, rebounds);
+            }
         }
     }
 }
@@ -123,7 +126,7 @@ impl Pass for AfterDisplacing<'_> {
 /// Current bodies, and the bodies before, whose spins hold the rotation of round bodies (not part of the
 /// rows).
 struct Displaced<'a> {
-    rows: &'a mut [BodyRow],
+    rows: SharedRows<'a>,
     before: &'a [BodyRow],
 }
 
@@ -136,29 +139,29 @@ impl RowStore for Displaced<'_> {
 
     #[inline(always)]
     fn gather<L: Lanes>(&self, index: LaneIndex<L::Index>) -> [L; 8] {
-        L::gather(self.rows, index)
+        L::gather_shared_rows(self.rows, index)
     }
 
     #[inline(always)]
     fn scatter_velocity<L: Lanes>(&mut self, index: LaneIndex<L::Index>, velocity: [L; 4]) {
-        L::scatter_velocity(self.rows, index, velocity);
+        self.rows.scatter_velocity(index, velocity);
     }
 }
 
 #[inline(always)]
 fn displace<L: Lanes, N: KernelFeatures, O: Partner>(
-    store: &mut Displaced<'_>,
-    batches: &mut Batches,
-    segment: &Segment,
-    &Displace { h, push_speed, compliance, first, .. }: &Displace<'_>,
+    rows: SharedRows<'_>,
+    of: SegmentRecords<'_, L>,
+    &Displace { h, push_speed, compliance, first, before }: &Displace<'_>,
 ) {
     let layout = const { Layout::of::<N, O>() };
+    let (mut store, pushes_a) = (Displaced { rows, before }, of.segment.pushes_a());
     let inv_h = L::splat(1.0 / h);
     let deepest = L::splat(-push_speed * h);
     // α̃ (1/kg), and α̃ h, because records hold λ/h.
     let (compliance, of_impulse) = (L::splat(compliance / (h * h)), L::splat(compliance / h));
     let zero = L::zero();
-    for_each_batch::<L, N, O, _>(store, batches, segment, |store, record, row_a, row_b| {
+    for_each_batch::<L, N, O, _>(&mut store, of, |store, record, row_a, row_b| {
         let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(store, row_a, row_b);
         let before = BodyPair::<L>::gather::<O, _>(store.before, row_a, row_b);
         let n = [record[0], record[1]];
@@ -172,7 +175,7 @@ fn displace<L: Lanes, N: KernelFeatures, O: Partner>(
             let mut k = mass_sum;
             if N::ROTATION {
                 k = (inertia[1] * arm[1]).mul_add(arm[1], k);
-                if O::HAS_ROW && segment.pushes_a() {
+                if O::HAS_ROW && pushes_a {
                     k = (inertia[0] * arm[0]).mul_add(arm[0], k);
                 }
             }
@@ -229,35 +232,34 @@ fn displace<L: Lanes, N: KernelFeatures, O: Partner>(
         let y = n[1].mul_add(sum[0], -(n[0] * sum[1]));
         b[DX] = b[INV_MASS].mul_add(x, b[DX]);
         b[DY] = b[INV_MASS].mul_add(y, b[DY]);
-        L::scatter_delta(store.rows, row_b, [b[DX], b[DY], angle[1], b[INV_INERTIA]]);
-        if O::HAS_ROW && segment.pushes_a() {
+        L::scatter_shared::<_, 2, 1>(store.rows, row_b, [b[DX], b[DY], angle[1], b[INV_INERTIA]]);
+        if O::HAS_ROW && pushes_a {
             a[DX] = a[INV_MASS].neg_mul_add(x, a[DX]);
             a[DY] = a[INV_MASS].neg_mul_add(y, a[DY]);
-            L::scatter_delta(store.rows, row_a, [a[DX], a[DY], angle[0], a[INV_INERTIA]]);
+            L::scatter_shared::<_, 2, 1>(store.rows, row_a, [a[DX], a[DY], angle[0], a[INV_INERTIA]]);
         }
     });
 }
 
 #[inline(never)]
 fn correct_all<L: Lanes, N: KernelFeatures, const BOUNCES: bool>(
-    rows: &mut [BodyRow],
+    rows: SharedRows<'_>,
     batches: &mut Batches,
     rebounds: &[Block],
 ) {
-    over_segments!(correct, L, N, BOUNCES; rows, batches, rebounds);
+    over_colors!(correct, L, N, BOUNCES; rows, batches, rebounds);
 }
 
 #[inline(always)]
 fn correct<L: Lanes, N: KernelFeatures, O: Partner, const BOUNCES: bool>(
-    rows: &mut [BodyRow],
-    batches: &mut Batches,
-    segment: &Segment,
+    mut rows: SharedRows<'_>,
+    of: SegmentRecords<'_, L>,
     rebounds: &[Block],
 ) {
     let layout = const { Layout::of::<N, O>() };
     let rebounds: &[L] = bytemuck::cast_slice(rebounds);
-    let mut slot = segment.first_slot;
-    for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
+    let (mut slot, pushes_a) = (of.segment.first_slot, of.segment.pushes_a());
+    for_each_batch::<L, N, O, _>(&mut rows, of, |rows, record, row_a, row_b| {
         let BodyPair { mut a, mut b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
         let mass_sum = if O::HAS_ROW { a[INV_MASS] + b[INV_MASS] } else { b[INV_MASS] };
@@ -291,6 +293,6 @@ fn correct<L: Lanes, N: KernelFeatures, O: Partner, const BOUNCES: bool>(
         }
         apply::<L, O>(&mut a, &mut b, n, sum, w);
         slot += L::WIDTH;
-        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b, segment.pushes_a());
+        BodyPair { a, b }.scatter_velocities::<O, _>(rows, row_a, row_b, pushes_a);
     });
 }

@@ -63,7 +63,7 @@ fn find<L: Lanes>(
     if 2.0 * fastest <= least {
         return;
     }
-    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, layout);
+    let SegmentRecords { records, contact, row_a, row_b, .. } = batches.records_of::<L>(segment, layout);
     let records = records.chunks_exact(layout.stride).zip(row_a.batches().zip(row_b.batches()));
     let quads: &[Quad] = bytemuck::cast_slice(increments);
     let (zero, per_step) = (L::zero(), L::splat(dt / h));

@@ -47,14 +47,14 @@ use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, TURN, arms, separation, spin, to_frame, turn, with_arms,
 };
 use crate::constraints::kernels::pass::{Pass, PassInput};
-use crate::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
+use crate::constraints::kernels::stages::{PairState, Stages, in_stages, over_colors};
 use crate::constraints::kernels::velocity::rules::Softness;
 use crate::constraints::kernels::velocity::sweep::{NormalRule, Rows, unbounded_friction};
-use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::records::batches::{Batches, SegmentRecords};
 use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
-use crate::lanes::{BodyRow, Lanes};
+use crate::lanes::{Lanes, SharedRows};
 
 /// A matrix with a determinant below this fraction of a₁₁ a₂₂ is solved row by row (1).
 const SINGULAR: f32 = 1e-3;
@@ -70,17 +70,17 @@ impl<R: NormalRule, const NORMAL_FIRST: bool> Pass for BlockSweep<R, NORMAL_FIRS
 
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
-        sweep::<L, F, R, NORMAL_FIRST>(on.rows, on.batches, self.0);
+        sweep::<L, F, R, NORMAL_FIRST>(SharedRows::among(on.rows, on.workers), on.batches, self.0);
     }
 }
 
 #[inline(never)]
 fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule, const NORMAL_FIRST: bool>(
-    rows: &mut [BodyRow],
+    rows: SharedRows<'_>,
     batches: &mut Batches,
     rule: R,
 ) {
-    over_segments!(segment, L, N, R, NORMAL_FIRST; rows, batches, rule);
+    over_colors!(segment, L, N, R, NORMAL_FIRST; rows, batches, rule);
 }
 
 /// The block sweep as a staged kernel.
@@ -102,12 +102,11 @@ struct PartialBlock<L> {
 
 #[inline(always)]
 fn segment<L: Lanes, N: KernelFeatures, O: Partner, R: NormalRule, const NORMAL_FIRST: bool>(
-    rows: &mut [BodyRow],
-    batches: &mut Batches,
-    segment: &Segment,
+    mut rows: SharedRows<'_>,
+    of: SegmentRecords<'_, L>,
     rule: R,
 ) {
-    in_stages::<L, N, O, _, _>(rows, batches, segment, InBlocks::<R, NORMAL_FIRST> { rule });
+    in_stages::<L, N, O, _, _>(&mut rows, of, InBlocks::<R, NORMAL_FIRST> { rule });
 }
 
 /// Solves the friction rows of a batch, bounded by the normal impulses in its record. `along_t` is the

@@ -7,7 +7,7 @@
 use crate::constraints::kernels::frame::{BodyPair, INV_INERTIA, INV_MASS, arms};
 use crate::constraints::kernels::pass::{Pass, PassInput, PassMode};
 use crate::constraints::kernels::stages::{for_each_batch, over_segments};
-use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::records::batches::SegmentRecords;
 use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
@@ -82,12 +82,11 @@ impl Pass for EffectiveMasses<'_> {
 #[inline(always)]
 fn segment<L: Lanes, N: KernelFeatures, O: Partner>(
     rows: &mut [BodyRow],
-    batches: &mut Batches,
-    segment: &Segment,
+    of: SegmentRecords<'_, L>,
     masses: &EffectiveMasses<'_>,
 ) {
     let layout = const { Layout::of::<N, O>() };
-    for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
+    for_each_batch::<L, N, O, _>(rows, of, |rows, record, row_a, row_b| {
         let changed: L = masses.changed([row_a, row_b]);
         if !changed.any_positive() {
             return;

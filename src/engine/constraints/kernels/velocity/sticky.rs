@@ -171,8 +171,7 @@ fn motion<L: Lanes, N: KernelFeatures, O: Partner>(
 #[inline(always)]
 fn sweep<L: Lanes, N: KernelFeatures, O: Partner>(
     rows: &mut [BodyRow],
-    batches: &mut Batches,
-    segment: &Segment,
+    of: SegmentRecords<'_, L>,
     drifts: &mut [Block],
     Sticky { h, fraction, push_speed, stick, reach, patch }: Sticky,
 ) {
@@ -180,7 +179,7 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Partner>(
     let [inv_h, rate, stick] = [1.0, fraction, stick].map(|x| L::splat(x / h));
     let (deepest, reach, zero) = (L::splat(-push_speed), L::splat(reach), L::zero());
     let drifts: &mut [L] = bytemuck::cast_slice_mut(drifts);
-    let SegmentRecords { records, row_a, row_b, .. } = batches.records_of::<L>(segment, &layout);
+    let SegmentRecords { segment, records, row_a, row_b, .. } = of;
     rows.assert_rows(row_b);
     rows.assert_rows(row_a);
     let indices = row_a.batches().zip(row_b.batches());
@@ -230,7 +229,7 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Partner>(
             let mut slides = zero;
             for p in 0..N::POINTS {
                 let [separation, drift] = motion[p];
-                let before = drift_at::<L>(segment, batch, p);
+                let before = drift_at::<L>(&segment, batch, p);
                 let drifted = drifts[before] + drift;
                 let is_near = |yes: L, no: L| (reach - separation).select_positive(yes, no);
                 let mut mass = record[layout.at(p, layout.tangent_mass)];
@@ -258,7 +257,7 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Partner>(
             }
             if patch.is_some() {
                 for p in 0..N::POINTS {
-                    drifts[flag_at::<L>(segment, batch, p)] = slides.select_positive(L::splat(1.0), zero);
+                    drifts[flag_at::<L>(&segment, batch, p)] = slides.select_positive(L::splat(1.0), zero);
                 }
             }
         }
@@ -270,15 +269,14 @@ fn sweep<L: Lanes, N: KernelFeatures, O: Partner>(
 #[inline(always)]
 fn store<L: Lanes, N: KernelFeatures, O: Partner>(
     rows: &mut [BodyRow],
-    batches: &mut Batches,
-    segment: &Segment,
+    of: SegmentRecords<'_, L>,
     kept: &mut SolverState,
     drifts: &[Block],
     reach: f32,
 ) {
     let layout = const { Layout::of::<N, O>() };
     let (kept, drifts): (_, &[L]) = (kept.by_point(), bytemuck::cast_slice(drifts));
-    let SegmentRecords { records, contact, row_a, row_b } = batches.records_of::<L>(segment, &layout);
+    let SegmentRecords { segment, records, contact, row_a, row_b } = of;
     rows.assert_rows(row_b);
     rows.assert_rows(row_a);
     let indices = contact.batches::<L::Index>().zip(row_a.batches().zip(row_b.batches()));
@@ -289,8 +287,8 @@ fn store<L: Lanes, N: KernelFeatures, O: Partner>(
         let BodyPair { a, b } = BodyPair::<L>::gather::<O, _>(rows, row_a, row_b);
         let motion = motion::<L, N, O>(record, &layout, &a, &b);
         for (p, [separation, drift]) in motion.into_iter().enumerate().take(N::POINTS) {
-            let drifted = drifts[drift_at::<L>(segment, batch, p)] + drift;
-            let slides = drifts[flag_at::<L>(segment, batch, p)];
+            let drifted = drifts[drift_at::<L>(&segment, batch, p)] + drift;
+            let slides = drifts[flag_at::<L>(&segment, batch, p)];
             let drifted = slides.select_positive(L::zero(), drifted);
             let mut near = (L::splat(reach) - separation).select_positive(drifted, L::zero());
             // Empty lanes refer to the contact of the first lane, so they write its value.

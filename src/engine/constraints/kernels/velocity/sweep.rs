@@ -35,14 +35,14 @@ use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, TURN, arms, separation, spin, to_frame, turn, turned, with_arms,
 };
 use crate::constraints::kernels::pass::{AnyPass, Pass, PassInput};
-use crate::constraints::kernels::stages::{PairState, Stages, in_stages, over_segments};
+use crate::constraints::kernels::stages::{PairState, Stages, in_stages, over_colors};
 use crate::constraints::kernels::velocity::rules::Softness;
 use crate::constraints::numerics::cone;
-use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::records::batches::{Batches, SegmentRecords};
 use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
-use crate::lanes::{BodyRow, Lanes, RowStore};
+use crate::lanes::{Lanes, RowStore, SharedRows};
 
 /// A rule for the new accumulated impulse of a normal row.
 ///
@@ -91,8 +91,8 @@ pub trait NormalRule: Copy + Send + Sync + 'static {
     /// A method of the rule, so that the compiler places its instances next to the rule: rules in separate
     /// files are compiled in parallel, and recompiled only if they change.
     #[inline(never)]
-    fn sweep<L: Lanes, N: KernelFeatures>(self, rows: &mut [BodyRow], batches: &mut Batches) {
-        over_segments!(sweep_segment, L, N, Self, [BodyRow]; rows, batches, self);
+    fn sweep<L: Lanes, N: KernelFeatures>(self, rows: SharedRows<'_>, batches: &mut Batches) {
+        over_colors!(shared_segment, L, N, Self; rows, batches, self);
     }
 }
 
@@ -107,7 +107,7 @@ impl<R: NormalRule> Pass for Sweep<R> {
 
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
-        self.0.sweep::<L, F>(on.rows, on.batches);
+        self.0.sweep::<L, F>(SharedRows::among(on.rows, on.workers), on.batches);
     }
 }
 
@@ -361,16 +361,24 @@ impl<L: Lanes, N: KernelFeatures, O: Partner, R: NormalRule> Stages<L, N, O> for
 #[inline(always)]
 pub(crate) fn sweep_segment<L: Lanes, N: KernelFeatures, O: Partner, R: NormalRule, S: RowStore + ?Sized>(
     rows: &mut S,
-    batches: &mut Batches,
-    segment: &Segment,
+    of: SegmentRecords<'_, L>,
     rule: R,
 ) {
-    in_stages::<L, N, O, _, S>(rows, batches, segment, RowByRow(rule));
+    in_stages::<L, N, O, _, S>(rows, of, RowByRow(rule));
+}
+
+#[inline(always)]
+fn shared_segment<L: Lanes, N: KernelFeatures, O: Partner, R: NormalRule>(
+    mut rows: SharedRows<'_>,
+    of: SegmentRecords<'_, L>,
+    rule: R,
+) {
+    sweep_segment::<L, N, O, R, _>(&mut rows, of, rule);
 }
 
 /// One velocity sweep over all segments, in order.
 pub fn sweep<L: Lanes, N: KernelFeatures, R: NormalRule>(
-    rows: &mut [BodyRow],
+    rows: SharedRows<'_>,
     batches: &mut Batches,
     rule: R,
 ) {

@@ -2,12 +2,12 @@
 
 use crate::constraints::kernels::frame::{BodyPair, INV_INERTIA, TURN, W, apply, arms, spin, turn, turned};
 use crate::constraints::kernels::pass::{Pass, PassInput};
-use crate::constraints::kernels::stages::{for_each_batch, over_segments};
-use crate::constraints::records::batches::{Batches, Segment};
+use crate::constraints::kernels::stages::{for_each_batch, over_colors};
+use crate::constraints::records::batches::{Batches, SegmentRecords};
 use crate::constraints::records::features::{
     KernelFeatures, Layout, OnMoving, OnStatic, Partner, PartnerKind,
 };
-use crate::lanes::{BodyRow, Lanes};
+use crate::lanes::{Lanes, SharedRows};
 
 /// The warm start: applies the accumulated impulses, with the arms at the start of the step or with arms that
 /// turn with their bodies.
@@ -20,36 +20,35 @@ impl Pass for WarmStart {
     #[inline(always)]
     fn run<L: Lanes, F: KernelFeatures>(&mut self, on: PassInput<'_>) {
         if self.turned {
-            warm_start_with::<L, F, true>(on.rows, on.batches);
+            warm_start_with::<L, F, true>(SharedRows::among(on.rows, on.workers), on.batches);
         } else {
-            warm_start_with::<L, F, false>(on.rows, on.batches);
+            warm_start_with::<L, F, false>(SharedRows::among(on.rows, on.workers), on.batches);
         }
     }
 }
 
 /// Applies all accumulated impulses, with the arms at the start of the step.
-pub fn warm_start<L: Lanes, N: KernelFeatures>(rows: &mut [BodyRow], batches: &mut Batches) {
+pub fn warm_start<L: Lanes, N: KernelFeatures>(rows: SharedRows<'_>, batches: &mut Batches) {
     warm_start_with::<L, N, false>(rows, batches);
 }
 
 #[inline(never)]
 fn warm_start_with<L: Lanes, N: KernelFeatures, const TURNED: bool>(
-    rows: &mut [BodyRow],
+    rows: SharedRows<'_>,
     batches: &mut Batches,
 ) {
-    over_segments!(warm_start_segment, L, N, TURNED; rows, batches);
+    over_colors!(warm_start_segment, L, N, TURNED; rows, batches);
 }
 
 /// Applies the accumulated impulses of a segment.
 #[inline(always)]
 fn warm_start_segment<L: Lanes, N: KernelFeatures, O: Partner, const TURNED: bool>(
-    rows: &mut [BodyRow],
-    batches: &mut Batches,
-    segment: &Segment,
+    mut rows: SharedRows<'_>,
+    of: SegmentRecords<'_, L>,
 ) {
     let layout = const { Layout::of::<N, O>() };
-    let pushes_a = segment.pushes_a();
-    for_each_batch::<L, N, O, _>(rows, batches, segment, |rows, record, row_a, row_b| {
+    let pushes_a = of.segment.pushes_a();
+    for_each_batch::<L, N, O, _>(&mut rows, of, |rows, record, row_a, row_b| {
         let BodyPair { mut a, mut b } = BodyPair::<L>::gather_whole::<O, _>(rows, row_a, row_b);
         let n = [record[0], record[1]];
         let inertia = [a[INV_INERTIA], b[INV_INERTIA]];

@@ -1,0 +1,322 @@
+//! Threads that share the work of a step.
+//!
+//! A step has hundreds of passes of a few microseconds each. So threads are kept, and wait for work in a loop: to hand it
+//! over takes a fraction of a microsecond. A thread that waits for longer goes to sleep. Results do not depend on the number
+//! of threads, because the parts of a task do not see each other.
+//!
+//! Each thread first takes the part with its own number, whose memory is in its cache from the last pass, and then what the
+//! others have not begun. So a thread that the system does not run holds nobody up.
+
+#![allow(
+    unsafe_code,
+    reason = "threads run a task that is borrowed; `run` does not return before they have finished it"
+)]
+
+use std::any::Any;
+use std::cell::UnsafeCell;
+use std::fmt;
+use std::hint::spin_loop;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+
+/// Largest number of threads.
+pub const MOST_THREADS: usize = 32;
+
+/// How often a thread looks for work, or for the end of it, before it lets others run: for some tens of microseconds.
+const LOOKS: u32 = 2_000;
+
+/// How often a thread lets others run before it sleeps. All in all it waits for some milliseconds, which is longer than a
+/// phase of a step without work for it, so that it seldom has to be woken: that takes as long as fifty sweeps.
+const TURNS: u32 = 2_000;
+
+/// The threads of a world, besides the one that steps it.
+///
+/// A copy has no threads until [`Self::set`].
+#[derive(Default)]
+pub struct Workers {
+    shared: Arc<Shared>,
+    threads: Vec<JoinHandle<()>>,
+    /// Number of threads asked for, the calling one not counted.
+    wanted: usize,
+}
+
+/// What the threads run; it gets the number of the thread.
+type Task<'a> = dyn Fn(usize) + Sync + 'a;
+
+#[derive(Default)]
+struct Shared {
+    /// Number of tasks so far.
+    epoch: AtomicUsize,
+    /// [`OPEN`] while threads may begin the task, and the number of threads that are at it.
+    gate: AtomicUsize,
+    task: TaskCell,
+    /// Whether there is a task. A task within a task runs in one thread.
+    is_busy: AtomicBool,
+    /// Whether the threads are to end.
+    ends: AtomicBool,
+    /// Which threads sleep.
+    sleeps: [AtomicBool; MOST_THREADS],
+    /// What a part panicked with.
+    panic: Mutex<Option<Box<dyn Any + Send>>>,
+}
+
+/// See [`Shared::gate`].
+const OPEN: usize = 1 << 31;
+
+#[derive(Default)]
+struct TaskCell(UnsafeCell<Option<*const Task<'static>>>);
+
+// SAFETY: it is written while the gate is closed and nobody is inside (`is_busy` admits one caller, which has waited for
+// that), and read by threads inside. The task is `Sync`.
+unsafe impl Send for TaskCell {}
+// SAFETY: as above.
+unsafe impl Sync for TaskCell {}
+
+impl Workers {
+    /// Starts or ends threads, so that there are `threads` with the calling one, [`MOST_THREADS`] at most. Fewer if the
+    /// system does not give as many.
+    pub fn set(&mut self, threads: usize) {
+        let wanted = threads.clamp(1, MOST_THREADS) - 1;
+        if self.wanted == wanted {
+            return;
+        }
+        self.end();
+        self.wanted = wanted;
+        self.shared = Arc::default();
+        for number in 1..=wanted {
+            let shared = Arc::clone(&self.shared);
+            let started = thread::Builder::new().name("simpulse".into()).spawn(move || shared.work(number));
+            match started {
+                Ok(thread) => self.threads.push(thread),
+                Err(_) => break,
+            }
+        }
+    }
+
+    /// Number of threads, the calling one included.
+    pub fn count(&self) -> usize {
+        self.threads.len() + 1
+    }
+
+    /// Runs `each` on every part, and returns when all are done. Parts beyond the number of threads wait for a thread.
+    pub fn each<P: Send>(&self, parts: impl Iterator<Item = P>, each: impl Fn(P) + Sync) {
+        // Few threads need little room.
+        match self.count() {
+            1 => parts.for_each(each),
+            2 => self.each_of::<2, P>(parts, each),
+            3..=8 => self.each_of::<8, P>(parts, each),
+            _ => self.each_of::<MOST_THREADS, P>(parts, each),
+        }
+    }
+
+    /// As [`Self::each`], with `N` threads at most.
+    fn each_of<const N: usize, P: Send>(&self, mut parts: impl Iterator<Item = P>, each: impl Fn(P) + Sync) {
+        loop {
+            let mut count = 0;
+            let taken: [Mutex<Option<P>>; N] = std::array::from_fn(|i| {
+                let part = if i < self.count() { parts.next() } else { None };
+                count += usize::from(part.is_some());
+                Mutex::new(part)
+            });
+            match count {
+                0 => return,
+                1 => each(
+                    taken.into_iter().find_map(|part| part.into_inner().ok().flatten()).expect("one part"),
+                ),
+                _ => self.run(&|number| {
+                    for i in (number..N).chain(0..number) {
+                        let part = taken[i].lock().unwrap_or_else(PoisonError::into_inner).take();
+                        part.into_iter().for_each(&each);
+                    }
+                }),
+            }
+            if count < self.count() {
+                return;
+            }
+        }
+    }
+
+    /// Size of parts of `len` things, one part for each thread, in whole cache lines of floats; no part is smaller than
+    /// `least`.
+    pub fn part(&self, len: usize, least: usize) -> usize {
+        len.div_ceil(self.count()).max(least).next_multiple_of(16)
+    }
+
+    /// Runs `task` in this thread and in every other that comes to it meanwhile, and returns when all have finished.
+    ///
+    /// # Panics
+    /// If the task panics in a thread, after all have finished.
+    fn run(&self, task: &Task<'_>) {
+        let shared = &*self.shared;
+        if shared.is_busy.swap(true, Ordering::Acquire) {
+            return task(0);
+        }
+        // SAFETY: only the lifetime is changed. Threads use the task inside of the gate alone, and this function waits until
+        // nobody is inside, also if a part panics.
+        let lasting = unsafe { std::mem::transmute::<*const Task<'_>, *const Task<'static>>(task) };
+        // SAFETY: the gate is closed and nobody is inside.
+        unsafe { *shared.task.0.get() = Some(lasting) };
+        shared.gate.store(OPEN, Ordering::Release);
+        shared.epoch.fetch_add(1, Ordering::SeqCst);
+        for (thread, sleeps) in self.threads.iter().zip(&shared.sleeps[1..]) {
+            if sleeps.load(Ordering::SeqCst) {
+                thread.thread().unpark();
+            }
+        }
+        shared.attempt(task, 0);
+        let (mut looks, mut inside) = (0, shared.gate.fetch_and(!OPEN, Ordering::AcqRel) & !OPEN);
+        while inside > 0 {
+            inside = shared.gate.load(Ordering::Acquire);
+            looks += 1;
+            // A thread that is inside may have to wait for a processor.
+            if looks % LOOKS == 0 { thread::yield_now() } else { spin_loop() }
+        }
+        let panic = shared.panic.lock().unwrap_or_else(PoisonError::into_inner).take();
+        shared.is_busy.store(false, Ordering::Release);
+        if let Some(panic) = panic {
+            std::panic::resume_unwind(panic);
+        }
+    }
+
+    /// Ends all threads.
+    fn end(&mut self) {
+        self.shared.ends.store(true, Ordering::SeqCst);
+        for thread in self.threads.drain(..) {
+            thread.thread().unpark();
+            // A thread does not panic: its tasks are caught.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Shared {
+    /// What a thread does until the end.
+    fn work(&self, number: usize) {
+        let mut done = 0;
+        let (mut looks, sleeps) = (0, &self.sleeps[number]);
+        while !self.ends.load(Ordering::SeqCst) {
+            if self.epoch.load(Ordering::Acquire) == done {
+                looks += 1;
+                if looks < LOOKS + TURNS {
+                    if looks < LOOKS {
+                        spin_loop()
+                    } else {
+                        thread::yield_now()
+                    }
+                    continue;
+                }
+                // Either this thread sees the new epoch, or the caller sees that it sleeps, and wakes it.
+                sleeps.store(true, Ordering::SeqCst);
+                if self.epoch.load(Ordering::SeqCst) == done && !self.ends.load(Ordering::SeqCst) {
+                    thread::park();
+                }
+                sleeps.store(false, Ordering::SeqCst);
+                continue;
+            }
+            (done, looks) = (self.epoch.load(Ordering::Acquire), 0);
+            let enter = |gate| (gate & OPEN != 0).then_some(gate + 1);
+            if self.gate.fetch_update(Ordering::AcqRel, Ordering::Acquire, enter).is_err() {
+                continue;
+            }
+            // SAFETY: this thread is inside: the task was written before the gate was opened, and the caller waits for all
+            // who are inside before it writes another.
+            if let Some(task) = unsafe { *self.task.0.get() } {
+                // SAFETY: as above: the task exists until this thread has left.
+                self.attempt(unsafe { &*task }, number);
+            }
+            self.gate.fetch_sub(1, Ordering::Release);
+        }
+    }
+
+    /// Runs the part of a thread; keeps its panic.
+    fn attempt(&self, task: &Task<'_>, number: usize) {
+        if let Err(panic) = catch_unwind(AssertUnwindSafe(|| task(number))) {
+            self.panic.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(panic);
+        }
+    }
+}
+
+impl Clone for Workers {
+    fn clone(&self) -> Self {
+        Workers::default()
+    }
+}
+
+impl Drop for Workers {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+impl fmt::Debug for Workers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Workers({})", self.count())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicU64;
+
+    fn with(threads: usize) -> Workers {
+        let mut workers = Workers::default();
+        workers.set(threads);
+        workers
+    }
+
+    #[test]
+    fn every_part_runs_once() {
+        for threads in [1, 2, 3, 8] {
+            let workers = with(threads);
+            for parts in [0, 1, 2, 7, 100] {
+                let mut seen = vec![0; parts];
+                workers.each(seen.iter_mut(), |part| *part += 1);
+                assert!(seen.iter().all(|&times| times == 1), "{threads} threads, {parts} parts: {seen:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn threads_that_sleep_are_woken() {
+        let workers = with(3);
+        let sum = AtomicU64::new(0);
+        for round in 0..20 {
+            workers.each(1..=3_u64, |part| {
+                sum.fetch_add(part, Ordering::Relaxed);
+            });
+            if round % 5 == 0 {
+                thread::sleep(std::time::Duration::from_millis(5));
+            }
+        }
+        assert_eq!(sum.into_inner(), 120);
+    }
+
+    #[test]
+    fn a_panic_ends_the_task_alone_and_a_task_within_a_task_runs() {
+        let workers = with(2);
+        let caught = catch_unwind(AssertUnwindSafe(|| {
+            workers.each(0..2, |part| assert!(part == 0, "part {part}"));
+        }));
+        assert!(caught.is_err());
+        let sum = AtomicU64::new(0);
+        workers.each(0..2, |_| {
+            workers.each(1..=2_u64, |part| {
+                sum.fetch_add(part, Ordering::Relaxed);
+            });
+        });
+        assert_eq!(sum.into_inner(), 6);
+    }
+
+    #[test]
+    fn threads_end_with_their_owner() {
+        let shared = {
+            let workers = with(4);
+            workers.each(0..4, |_| {});
+            Arc::downgrade(&workers.shared)
+        };
+        assert!(shared.upgrade().is_none());
+    }
+}
