@@ -40,6 +40,8 @@ pub struct Workers {
     threads: Vec<JoinHandle<()>>,
     /// Number of threads asked for, the calling one not counted.
     wanted: usize,
+    /// Whether the calling thread works alone.
+    rests: bool,
 }
 
 /// What the threads run; it gets the number of the thread.
@@ -95,9 +97,14 @@ impl Workers {
         }
     }
 
-    /// Number of threads, the calling one included.
+    /// Lets the calling thread work alone, or all threads, from now on.
+    pub fn rest(&mut self, rests: bool) {
+        self.rests = rests;
+    }
+
+    /// Number of threads that work, the calling one included.
     pub fn count(&self) -> usize {
-        self.threads.len() + 1
+        if self.rests { 1 } else { self.threads.len() + 1 }
     }
 
     /// Runs `each` on every part, and returns when all are done. Parts beyond the number of threads wait for a thread.

@@ -6,7 +6,7 @@ use simpulse::engine::solvers::VARIANTS;
 use simpulse::engine::world::Settings;
 
 /// Scenes whose colors threads divide, with the number of steps: boxes at rest, bodies of several shapes that fall, joints.
-const SCENES: [(&str, usize); 3] = [("pyramid:40", 4), ("compounds", 8), ("joint_grid:40", 4)];
+const SCENES: [(&str, usize); 3] = [("pyramid:70", 3), ("compounds", 8), ("joint_grid:80", 3)];
 
 #[test]
 fn every_number_of_threads_gives_the_same_bits() {

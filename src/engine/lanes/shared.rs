@@ -11,8 +11,8 @@ use crate::workers::Workers;
 use bytemuck::Pod;
 use std::marker::PhantomData;
 
-/// Least number of lanes that are worth a thread: half a microsecond of a sweep, more than it takes to hand them over.
-const LEAST_PART: usize = 128;
+/// Least number of lanes that are worth a thread: a microsecond of a sweep, more than it takes to hand them over.
+const LEAST_PART: usize = 256;
 
 /// Records that may be shared by threads, each of which gathers and scatters records of its own.
 ///

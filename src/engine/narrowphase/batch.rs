@@ -153,8 +153,8 @@ pub struct Jobs {
     pub contact: Vec<u32>,
 }
 
-/// Number of pairs from which on threads share them.
-const LEAST_SHARED: usize = 512;
+/// Least number of pairs that are worth a thread.
+const LEAST_PART: usize = 256;
 
 /// Index of a pair without a contact.
 pub const NO_CONTACT: u32 = u32::MAX;
@@ -246,7 +246,8 @@ pub fn update(
     let beyond = jobs.contact.iter().fold(0, |most, &i| i.wrapping_add(1).max(most));
     assert!(jobs.contact.len() == count, "{count} pairs, and contacts for {}", jobs.contact.len());
     assert!(beyond as usize <= made, "a pair of contact {} of {made}", beyond.wrapping_sub(1));
-    let parts = if count < LEAST_SHARED { 1 } else { workers.count() };
+    let size = workers.part(count, LEAST_PART);
+    let parts = count.div_ceil(size).max(1);
     // For each part a batch of new contacts, and one that pairs without a contact read.
     let spare = width.lanes() + 1;
     contacts.resize(made + parts * spare, Contact::default());
@@ -274,9 +275,8 @@ pub fn update(
     } else {
         // SAFETY: every pair has a contact of its own, and every part its own spare contacts.
         let (of_contacts, of_found) = unsafe { (shared.0.sent(), shared.1.sent()) };
-        let size = workers.part(count, 1);
         let mut results: Vec<(usize, Vec<(u32, Contact, Option<Found>)>)> =
-            (0..count.div_ceil(size)).map(|_| Default::default()).collect();
+            (0..parts).map(|_| Default::default()).collect();
         workers.each(results.iter_mut().enumerate(), |(part, (points, changes))| {
             let jobs = part * size..((part + 1) * size).min(count);
             let lists = JobLists(lists.map(|list| list.part(jobs.clone())));

@@ -47,6 +47,9 @@ pub use joints::SolvedBlock;
 pub use queries::{Queries, RayHit};
 pub use settings::{Order, Settings};
 
+/// Number of pairs from which on threads share a step.
+const LEAST_PAIRS: usize = 6000;
+
 /// Contact properties of a shape.
 #[derive(Clone, Copy, Debug, Default)]
 struct Surface {
@@ -210,7 +213,7 @@ impl World {
     pub fn step(&mut self) -> Result<(), StepError> {
         self.settings.check().map_err(StepError::Settings)?;
         let mut clock = Clock::start(self.settings.timed);
-        self.work.workers.set(self.settings.threads);
+        self.set_workers();
         self.solve(&mut clock);
         self.store();
         clock.lap(Phase::Store);
@@ -274,7 +277,7 @@ impl World {
     pub fn frozen_step(&mut self) {
         let mut clock = Clock::start(self.settings.timed);
         self.pairs_are_stale = true;
-        self.work.workers.set(self.settings.threads);
+        self.set_workers();
         self.solve(&mut clock);
         self.timings = clock.stop();
     }
@@ -301,6 +304,13 @@ impl World {
     #[doc(hidden)]
     pub fn workspace(&mut self) -> &mut Workspace {
         &mut self.work
+    }
+
+    /// Starts the threads of the settings. A scene of few pairs is solved by this one alone: the others would have a
+    /// microsecond of work in each pass, and bodies would go from cache to cache.
+    fn set_workers(&mut self) {
+        self.work.workers.set(self.settings.threads);
+        self.work.workers.rest(self.pairs.len() < LEAST_PAIRS);
     }
 
     /// Runs a step up to the new velocities and displacements in the rows.

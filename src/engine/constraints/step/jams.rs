@@ -81,6 +81,8 @@ pub(crate) struct Jams {
     squeezed: Vec<f32>,
     /// Whether a body has a contact that is deep enough for a jam. `[bodies]`
     may_jam: Vec<bool>,
+    /// Whether a body is in `jammed`. `[bodies]`
+    is_jammed: Vec<bool>,
     /// Bodies in a jam of a squeeze, by number, and the bound of their speed (m/s); those of the last step until
     /// this step's are known.
     jammed: Vec<(u32, f32)>,
@@ -98,7 +100,7 @@ impl Jams {
         self.deep.clear();
         self.pressed.clear();
         // Jams of the last step.
-        self.forget_jams(contacts);
+        self.forget_jams(contacts, bodies.len());
         self.jammed.clear();
         for (i, contact) in contacts.iter().enumerate() {
             if contact.manifold.points().iter().any(|point| point.separation < -slop) {
@@ -139,7 +141,7 @@ impl Jams {
         if self.jammed.is_empty() {
             return;
         }
-        self.forget_jams(contacts);
+        self.forget_jams(contacts, bodies.len());
         for (body, most) in &mut self.jammed {
             let (i, square) = (*body as usize, square_gyration(bodies, *body));
             let had = speed(bodies.velocity(i).to_array(), bodies.angular_velocity[i], square);
@@ -148,13 +150,17 @@ impl Jams {
     }
 
     /// Zeroes the impulses of bodies in a jam of a squeeze.
-    fn forget_jams(&self, contacts: &mut [Contact]) {
+    fn forget_jams(&mut self, contacts: &mut [Contact], bodies: usize) {
         if self.jammed.is_empty() {
             return;
         }
-        let is_released = |body| self.jammed.binary_search_by_key(&body, |jammed| jammed.0).is_ok();
+        self.is_jammed.clear();
+        self.is_jammed.resize(bodies, false);
+        for &(body, _) in &self.jammed {
+            self.is_jammed.get_mut(body as usize).into_iter().for_each(|jammed| *jammed = true);
+        }
         for contact in contacts {
-            if is_released(contact.body_a) || is_released(contact.body_b) {
+            if self.is_jammed[contact.body_a as usize] || self.is_jammed[contact.body_b as usize] {
                 forget(contact);
             }
         }
