@@ -133,7 +133,7 @@ fn settings_and_scenes_change_and_bad_values_change_nothing() {
     act(&mut session, r#"{"do":"parameter","pane":0,"name":"contact_hertz","value":60}"#);
     let budget = r#"{"substeps":7,"velocity_iterations":2,"relax_iterations":1,"position_iterations":0}"#;
     act(&mut session, &format!(r#"{{"do":"budget","pane":1,"budget":{budget}}}"#));
-    act(&mut session, r#"{"do":"treatment","pane":0,"frozen":"off","impacts":"waves"}"#);
+    act(&mut session, r#"{"do":"treatment","pane":0,"frozen":"off","impacts":"waves","threads":2}"#);
     act(&mut session, r#"{"do":"scene","size":6,"friction":0.5}"#);
     act(&mut session, r#"{"do":"scene","gravity":5}"#);
     let settings = |session: &Session| {

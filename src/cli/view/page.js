@@ -258,9 +258,10 @@
       const made2 = slider(made.knobs, p.name.replaceAll("_", " "), p.value, [low, high], "any", p.unit, (value) => send({ do: "parameter", pane: k, name: p.name, value }));
       made2.title = `${p.meaning}; default ${p.default} ${p.unit}`;
     }
-    const treat = { do: "treatment", pane: k, frozen: own.frozen.value, impacts: own.impacts.value };
+    const treat = { do: "treatment", pane: k, frozen: own.frozen.value, impacts: own.impacts.value, threads: own.threads };
     choice(made.knobs, "frozen contacts", own.frozen, (frozen) => send(Object.assign(treat, { frozen })));
     choice(made.knobs, "impacts", own.impacts, (impacts) => send(Object.assign(treat, { impacts })));
+    if (own.processors > 1) slider(made.knobs, "threads", own.threads, [1, own.processors], 1, "", (threads) => send(Object.assign(treat, { threads })));
   }
 
   // A slider with a number beside it.

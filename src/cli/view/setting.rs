@@ -3,6 +3,7 @@
 use crate::cli::values::{SettingArgs, frozen};
 use crate::engine::constraints::Impacts;
 use crate::engine::solvers::{Variant, find};
+use crate::engine::workers::MOST_THREADS;
 use crate::engine::world::Settings;
 use crate::lab::error::Error;
 use crate::lab::study::budget;
@@ -43,6 +44,11 @@ impl PaneArg {
             let count = || value.parse::<u32>().map_err(|_| refuse("a whole number"));
             match name.strip_suffix("_iterations").unwrap_or(name) {
                 "substeps" => settings.budget.substeps = count()?,
+                "threads" => {
+                    let most = MOST_THREADS as u32;
+                    let threads = Some(count()?).filter(|count| (1..=most).contains(count));
+                    settings.threads = threads.ok_or_else(|| refuse(&format!("1 to {most}")))? as usize;
+                }
                 kind @ ("velocity" | "relax" | "position") => {
                     budget::check_used(&format!("{kind}-iterations"), &[self.solver])?;
                     let budget = &mut settings.budget;
@@ -88,6 +94,7 @@ mod tests {
             ("pgs:contact_hertz=60", "contact_hertz"),
             ("soft_step:contact_hertz=-1", "-1"),
             ("soft_step:impacts=some", "'some'"),
+            ("soft_step:threads=0", "'0'"),
             ("soft_step:frozen=some", "'some'"),
         ] {
             let message = of(text).unwrap_err().to_string();

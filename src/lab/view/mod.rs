@@ -170,7 +170,9 @@ impl Session {
             }
             Request::Budget { pane, budget } => self.pane(*pane)?.set_budget(*budget)?,
             Request::Parameter { pane, name, value } => self.pane(*pane)?.set_parameter(name, *value)?,
-            Request::Treatment { pane, frozen, impacts } => self.pane(*pane)?.treat(*frozen, *impacts),
+            Request::Treatment { pane, frozen, impacts, threads } => {
+                self.pane(*pane)?.treat(*frozen, *impacts, *threads);
+            }
             Request::Grab { pane, at } => self.grab(*pane, *at)?,
             Request::Move { at } => self.move_to(*at)?,
             Request::Release => self.grab = None,

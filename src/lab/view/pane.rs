@@ -139,9 +139,10 @@ impl Pane {
         Ok(())
     }
 
-    /// Sets the treatment of frozen contacts and of impacts.
-    pub(super) fn treat(&mut self, frozen: Freezing, impacts: Impacts) {
-        (self.world.settings.frozen, self.world.settings.impacts) = (frozen, impacts);
+    /// Sets the treatment of frozen contacts and of impacts, and the number of threads.
+    pub(super) fn treat(&mut self, frozen: Freezing, impacts: Impacts, threads: usize) {
+        let settings = &mut self.world.settings;
+        (settings.frozen, settings.impacts, settings.threads) = (frozen, impacts, threads);
         self.measure_again(false);
     }
 

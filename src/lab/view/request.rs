@@ -46,7 +46,7 @@ pub enum Request {
         /// Its new value.
         value: f32,
     },
-    /// Set the treatment of frozen contacts and of impacts in a pane.
+    /// Set the treatment of frozen contacts and of impacts in a pane, and its threads.
     Treatment {
         /// The pane.
         pane: usize,
@@ -54,6 +54,8 @@ pub enum Request {
         frozen: Freezing,
         /// Impacts.
         impacts: Impacts,
+        /// Threads that share a step.
+        threads: usize,
     },
     /// Take hold of the dynamic body at a place, in all panes; of none if there is none.
     Grab {

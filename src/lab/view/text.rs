@@ -8,6 +8,7 @@ use crate::engine::bodies::BodyKind;
 use crate::engine::clock::Phase;
 use crate::engine::constraints::Impacts;
 use crate::engine::narrowphase::frozen::{FreezeLimits, Freezing};
+use crate::engine::workers::MOST_THREADS;
 use crate::lab::error::Error;
 use crate::lab::overrides::decimal;
 use crate::lab::recording::record::{self, Caption};
@@ -102,6 +103,8 @@ fn setting(pane: &Pane) -> Value {
         "parameters": parameters.collect::<Vec<_>>(),
         "frozen": { "value": settings.frozen, "choices": frozen },
         "impacts": { "value": settings.impacts, "choices": Impacts::ALL.map(|i| (i.name(), i)) },
+        "threads": settings.threads,
+        "processors": std::thread::available_parallelism().map_or(1, usize::from).min(MOST_THREADS),
     })
 }
 
@@ -124,6 +127,9 @@ fn rust(pane: &Pane) -> String {
     }
     if s.continuous != solver.continuous {
         text += &format!("    continuous: {},\n", s.continuous);
+    }
+    if s.threads != 1 {
+        text += &format!("    threads: {},\n", s.threads);
     }
     if s.impacts != Impacts::Own {
         text += &format!("    impacts: simpulse::engine::constraints::Impacts::{:?},\n", s.impacts);
