@@ -18,7 +18,7 @@ use crate::lab::overrides;
 use crate::lab::pokes;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::table::error_list;
-use crate::lab::report::units::{bodies, lanes, ratio, si};
+use crate::lab::report::units::{self, bodies, lanes_or_order, percent, ratio, si};
 use crate::lab::scenes::holds::Broken;
 use crate::lab::scenes::{Loaded, Scene};
 use crate::lab::study::{FailedAt, TruthError, budget, open_scene};
@@ -31,9 +31,8 @@ use std::process::ExitCode;
 
 /// Run one scene with one solver; print its time and its errors
 ///
-/// Prints the key figures: the time of a step and of its longest phase, the maximum penetration, the contact-law
-/// residual, the distance to the scene's reference value, the residual speed at rest, the change of energy, and
-/// whether the scene holds. `--all` prints the rest.
+/// Prints the key figures: the time of a step and of its longest phase, the overlap, the force error, the distance to
+/// the scene's reference value, the speed that remains at rest, the change of energy, and whether the scene holds. `--all` prints the rest.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -52,12 +51,12 @@ pub struct RunArgs {
     /// Solver, budget and parameters
     #[command(flatten)]
     pub setting: SettingArgs,
-    /// Lanes per instruction [default: as many as the colors fill and the build has instructions for, 1 in natural
+    /// Lanes per instruction [default: as many as the colors fill and the build has instructions for, 1 in file
     /// order; wider ones are emulated]
     #[arg(long, value_name = "N", value_parser = values::lanes())]
     pub lanes: Option<LaneWidth>,
     /// Constraint order
-    #[arg(long, default_value = "colored", value_name = "ORDER", value_parser = values::order())]
+    #[arg(long, default_value = "parallel", value_name = "ORDER", value_parser = values::order())]
     pub order: Order,
     /// Steps [default: those of the scene]
     #[arg(long, value_name = "N")]
@@ -240,7 +239,7 @@ pub(super) fn settings(args: &RunArgs, own: Settings) -> Result<Settings, Error>
         (Order::Colored, None) => own,
         (_, None | Some(LaneWidth::W1)) => own.exactly(LaneWidth::W1),
         (order, Some(width)) => {
-            let message = format!("{}, but {} order has 1 lane", width.lanes(), order.name());
+            let message = format!("{}, but {} order has 1 lane", width.lanes(), units::order(order));
             return Err(Error::invalid("lanes", message));
         }
     };
@@ -257,11 +256,11 @@ impl RunResult {
     /// |---|---|
     /// | time of a step | whether the budget can be afforded at all |
     /// | longest phase | whether fewer sweeps, more lanes or another broad phase would help |
-    /// | maximum penetration | more substeps or stiffer contacts: overlap is the visible error |
-    /// | contact-law residual | more sweeps: loads and friction are no more accurate than this |
-    /// | distance to reference value | another solver: a small residual of the wrong law is still wrong |
+    /// | overlap | more substeps or stiffer contacts: it is the visible error |
+    /// | force error | more sweeps: loads and friction are no more accurate than this |
+    /// | distance to reference value | another solver: small errors under the wrong law are still wrong |
     /// | holds | if it does not, no other figure matters |
-    /// | residual speed | whether bodies could sleep, or jitter |
+    /// | speed at rest | whether bodies could sleep, or jitter |
     /// | energy change | damping: a gain ends in an explosion, a loss looks viscous |
     ///
     /// `--all` prints the others, each of which explains one of these.
@@ -278,7 +277,7 @@ impl RunResult {
             let why = "of steps: too many points for the solver's own method".into();
             lines.push(("solved by sweeps alone", format!("{:.0} %", 100.0 * sample.load.unsolved), why));
         }
-        let name = if self.rests { "penetration, 99 % and at rest" } else { "penetration, 99 % of points" };
+        let name = if self.rests { "overlap, 99 % and at rest" } else { "overlap that the solver left, 99 %" };
         let [most, first] = ["penetration_max_m", "flight_depth_max_m"].map(|name| si(at(name), "m"));
         lines.extend([
             ("error", String::new(), String::new()),
@@ -312,9 +311,9 @@ impl RunResult {
         };
         lines.extend([
             (
-                "contact-law residual, rms",
-                ratio(e.law_rms_lighter()),
-                "weights of the lighter body × step".into(),
+                "force error, rms",
+                percent(e.law_rms_lighter()),
+                "of the lighter body's weight; distance of contact impulses from the contact law".into(),
             ),
             ("distance to reference value", distance, known),
             ("behavior", String::new(), String::new()),
@@ -323,7 +322,7 @@ impl RunResult {
                 self.broken.map_or(yes.into(), |broken| broken.mark.word().into()),
                 self.broken.map_or(String::new(), |broken| format!("at step {}", broken.step)),
             ),
-            ("residual speed, last second", si(e.rest_velocity(), "m/s"), "rms".into()),
+            ("speed at rest, last second", si(e.rest_velocity(), "m/s"), "rms".into()),
             ("energy change", ratio(at("energy_change")), "relative; positive is a gain".into()),
         ]);
         if let Some(Poked { seed, pushes, displaced_rms_m, displaced_max_m }) = &self.poked {
@@ -397,10 +396,7 @@ fn json(world: &World, scene: &Scene, found: &RunResult) -> Result<Value, Error>
 /// Budget, and order or lanes, as text.
 pub(super) fn how(world: &World) -> String {
     let s = &world.settings;
-    let order = match s.order {
-        Order::Colored => lanes(world.lane_width().lanes()),
-        order => format!("{} order", order.name()),
-    };
+    let order = lanes_or_order(s.order, world.lane_width().lanes());
     format!("{}, {order}", budget::with_treatments(budget::brief(&s.budget, s.solver), s.impacts, s.frozen))
 }
 

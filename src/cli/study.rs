@@ -38,7 +38,7 @@ repeats it). On other scenes it runs at half, once and twice its standard budget
 options, every combination runs; values that a solver ignores are dropped.
 A folder keeps every study: what it holds is moved to FOLDER/previous/N when the first scene of another study
 is finished. Each scene is written as soon as it is finished; --resume runs those that are missing.
-A sweep runs at each solver's standard budget, in colored order at the widest native lanes, unless
+A sweep runs at each solver's standard budget, in parallel order at the widest native lanes, unless
 other options say otherwise.
 
 Examples:
@@ -55,7 +55,7 @@ Examples:
   simpulse study --scenes stack:20,my.json --velocity-iterations 4,16,64 --out results/stack
   simpulse study --scenes my.json --solvers all --thorough --out results/my
   simpulse study --scenes stack:20,arch --frozen off --frozen own --frozen 1mm,0.004,loaded --out results/frozen
-  simpulse study --scenes pyramid:20 --standard --orders natural,reversed,shuffled,colored --out results/orders";
+  simpulse study --scenes pyramid:20 --standard --orders file,reversed,shuffled,parallel --out results/orders";
 
 /// Lists are separated by commas.
 #[derive(Args, Debug)]
@@ -70,7 +70,8 @@ pub struct StudyArgs {
     /// wider ones are emulated]
     #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = values::lanes())]
     pub lanes: Vec<LaneWidth>,
-    /// Constraint orders [default: natural,colored]
+    /// Orders of constraints: file (one after the other, as they are found), reversed, shuffled, and parallel (by
+    /// colors, in lanes) [default: file,parallel]
     #[arg(long, value_delimiter = ',', value_name = "ORDER,…", value_parser = values::order())]
     pub orders: Vec<Order>,
     /// Impact laws: own is the solver's, waves solves impacts in waves before the step, none turns bouncing off.
@@ -106,8 +107,8 @@ pub struct StudyArgs {
     /// friction, second points, rotation and restitution where a scene has none
     #[arg(long, value_name = "all", value_parser = ["all"], conflicts_with = "sweep")]
     pub features: Option<String>,
-    /// Override the scenes' tolerances, such as penetration=5mm,residual=0.05,reference=0.1 (`simpulse list NAME`
-    /// lists them; that of the reference value has the value's unit)
+    /// Override the scenes' tolerances, such as penetration=5mm,residual=0.05 (overlap, force error),reference=0.1
+    /// (`simpulse list NAME` lists them; that of the reference value has the value's unit)
     #[arg(long, value_delimiter = ',', value_name = "NAME=VALUE,…", value_parser = NonEmptyStringValueParser::new())]
     pub tolerance: Vec<String>,
     /// Steps of the runs that measure errors [default: those of each scene]

@@ -10,7 +10,7 @@ use crate::lab::error::Error;
 use crate::lab::overrides::{self, Override};
 use crate::lab::scenes::CATALOG;
 use crate::lab::study::{self, DEFAULT_SCENES, DEFAULT_SOLVERS, budget, default_solvers};
-use crate::lab::units::quantity;
+use crate::lab::units::{self, quantity};
 use clap::Args;
 use clap::builder::{NonEmptyStringValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 
@@ -120,12 +120,14 @@ pub fn lanes() -> impl TypedValueParser<Value = LaneWidth> {
 
 /// The parser of constraint orders.
 pub fn order() -> impl TypedValueParser<Value = Order> {
+    // The names in files of results are accepted as well.
     let names = Order::ALL.map(|order| match order {
-        Order::Colored => PossibleValue::new("colored").alias("coloured"),
-        order => PossibleValue::new(order.name()),
+        Order::Colored => PossibleValue::new(units::order(order)).aliases(["colored", "coloured"]),
+        order => PossibleValue::new(units::order(order)).alias(order.name()),
     });
     PossibleValuesParser::new(names).map(|name| {
-        Order::ALL.into_iter().find(|order| order.name() == name.as_str()).unwrap_or(Order::Colored)
+        let is_it = |order: &Order| [order.name(), units::order(*order)].contains(&name.as_str());
+        Order::ALL.into_iter().find(is_it).unwrap_or(Order::Colored)
     })
 }
 

@@ -23,6 +23,7 @@ pub mod holds;
 mod incline;
 mod joints;
 mod junkyard;
+pub mod kind;
 mod linked;
 mod machines;
 mod mass_ratio;
