@@ -53,31 +53,31 @@ pub struct RunArgs {
     pub setting: SettingArgs,
     /// Lanes per instruction [default: as many as the colors fill and the build has instructions for, 1 in file
     /// order; wider ones are emulated]
-    #[arg(long, value_name = "N", value_parser = values::lanes())]
+    #[arg(help_heading = "Solver and setting", long, value_name = "N", value_parser = values::lanes())]
     pub lanes: Option<LaneWidth>,
     /// Constraint order
-    #[arg(long, default_value = "parallel", value_name = "ORDER", value_parser = values::order())]
+    #[arg(help_heading = "Solver and setting", long, default_value = "parallel", value_name = "ORDER", value_parser = values::order())]
     pub order: Order,
     /// Steps [default: those of the scene]
-    #[arg(long, value_name = "N")]
+    #[arg(help_heading = "Scene and time", long, value_name = "N")]
     pub steps: Option<u32>,
     /// Step in seconds [default: that of the scene]
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(help_heading = "Scene and time", long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub dt: Option<f64>,
     /// Random seed of scenes that have one
-    #[arg(long)]
+    #[arg(help_heading = "Scene and time", long)]
     pub seed: Option<u64>,
     /// Write a CSV of step,time,body,x,y,angle,vx,vy,omega; angles include whole turns
-    #[arg(long, value_name = "FILE.csv")]
+    #[arg(help_heading = "Output", long, value_name = "FILE.csv")]
     pub state: Option<PathBuf>,
     /// Write a CSV of contact points with their impulses (N·s over the step)
-    #[arg(long, value_name = "FILE.csv")]
+    #[arg(help_heading = "Output", long, value_name = "FILE.csv")]
     pub contacts: Option<PathBuf>,
     /// Write a CSV of joints with their gaps, angles, impulses by row (N·s over the step) and loads
-    #[arg(long, value_name = "FILE.csv")]
+    #[arg(help_heading = "Output", long, value_name = "FILE.csv")]
     pub joints: Option<PathBuf>,
     /// Write the phases of every step as a Chrome trace (JSON), for Perfetto and similar viewers
-    #[arg(long, value_name = "FILE.json", conflicts_with_all = ["picture", "record"])]
+    #[arg(help_heading = "Output", long, value_name = "FILE.json", conflicts_with_all = ["picture", "record"])]
     pub trace: Option<PathBuf>,
     /// Picture of a frame
     #[command(flatten)]
@@ -86,20 +86,20 @@ pub struct RunArgs {
     #[command(flatten)]
     pub record: RecordArgs,
     /// Write every K-th step [default: the last step only in CSV files, every step in a recording]
-    #[arg(long, value_name = "K")]
+    #[arg(help_heading = "Output", long, value_name = "K")]
     pub every: Option<u32>,
     /// Continuous collision: stop fast bodies at the surfaces that they would pass through [default: the solver's]
-    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    #[arg(help_heading = "Solver and setting", long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pub continuous: Option<bool>,
     /// Push random bodies at random times in the first half of the run, as a player would; the seed decides which and
     /// when. The figures are those of the poked run, and bodies are compared with an unpoked one
-    #[arg(long, value_name = "SEED", conflicts_with_all = ["picture", "record"])]
+    #[arg(help_heading = "Scene and time", long, value_name = "SEED", conflicts_with_all = ["picture", "record"])]
     pub poke: Option<u64>,
     /// Print all phases, counts and errors
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     pub all: bool,
     /// Print JSON instead of text: everything
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     pub json: bool,
 }
 

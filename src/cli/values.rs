@@ -25,6 +25,7 @@ pub enum Choice {
 
 /// `--solvers`
 #[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Solver and setting")]
 pub struct Solvers {
     /// Solvers to run
     #[arg(long, value_delimiter = ',', value_name = "SOLVER,…", value_parser = choice(), help = solvers_help())]
@@ -140,6 +141,7 @@ pub fn impacts() -> impl TypedValueParser<Value = Impacts> {
 
 /// `--impacts` of commands that take one treatment.
 #[derive(Args, Clone, Copy, Debug, Default)]
+#[command(next_help_heading = "Solver and setting")]
 pub struct ImpactArgs {
     /// Impact law: own is the solver's, waves solves impacts in waves before the step, none turns bouncing off
     #[arg(long, default_value = "own", value_name = "TREATMENT", value_parser = impacts())]
@@ -148,6 +150,7 @@ pub struct ImpactArgs {
 
 /// `--frozen` of commands that take one choice.
 #[derive(Args, Clone, Copy, Debug, Default)]
+#[command(next_help_heading = "Solver and setting")]
 pub struct FrozenArgs {
     /// Contacts that keep their normal and lever arms while bodies hardly move: own is the solver's choice, off is
     /// never, DISTANCE,TURN within such a motion (1mm,0.01: meters and radians), and DISTANCE,TURN,loaded only where
@@ -181,6 +184,7 @@ pub(super) fn frozen(text: &str) -> Result<Freezing, Error> {
 
 /// `--without` of commands that run a solver.
 #[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Solver and setting")]
 pub struct WithoutArgs {
     /// Mechanisms of the solver to leave out (`simpulse verify --without all` shows what each is for)
     #[arg(long, value_delimiter = ',', value_name = "NAME,…", value_parser = NonEmptyStringValueParser::new())]
@@ -207,6 +211,7 @@ pub fn widths(given: &[LaneWidth], own: Vec<LaneWidth>) -> Vec<LaneWidth> {
 
 /// The budget and the parameters of a setting.
 #[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Solver and setting")]
 pub struct BudgetArgs {
     /// Substeps [default: the solver's]
     #[arg(long, value_name = "N")]
@@ -227,6 +232,7 @@ pub struct BudgetArgs {
 
 /// The solver, its budget and its parameters, for commands that run one setting.
 #[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Solver and setting")]
 pub struct SettingArgs {
     /// Solver
     #[arg(long, default_value = DEFAULT, value_name = "SOLVER", value_parser = solver())]
@@ -296,6 +302,7 @@ impl SettingArgs {
 
 /// `--lanes` of commands that run at one width.
 #[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Solver and setting")]
 pub struct LaneArgs {
     /// Lanes per instruction [default: the widest that this build has instructions for; wider ones
     /// are emulated]

@@ -50,7 +50,7 @@ const fn column([name, unit, meaning]: [&'static str; 3]) -> Column {
     Column { name, unit, meaning }
 }
 
-fn listed(columns: &[[&'static str; 3]]) -> Vec<Column> {
+pub(super) fn listed(columns: &[[&'static str; 3]]) -> Vec<Column> {
     columns.iter().copied().map(column).collect()
 }
 
@@ -367,7 +367,7 @@ pub static JOINTS: Sheet = Sheet {
 };
 
 /// All kinds of CSV files.
-pub static SHEETS: [&Sheet; 5] = [&STUDY, &CONVERGE, &STATE, &CONTACTS, &JOINTS];
+pub static SHEETS: [&Sheet; 6] = [&STUDY, &super::ensemble::TIDY, &CONVERGE, &STATE, &CONTACTS, &JOINTS];
 
 impl Sheet {
     /// Names of the columns, in order.

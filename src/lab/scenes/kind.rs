@@ -52,9 +52,9 @@ impl SceneKind {
         }
     }
 
-    /// The kind of a scene of the catalog, by its name with or without a size; `None` for other scenes.
+    /// The kind of a scene of the catalog, by its name with or without size and seed; `None` for other scenes.
     pub fn of(name: &str) -> Option<Self> {
-        Some(match name.split(':').next().unwrap_or(name) {
+        Some(match name.split([':', '@']).next().unwrap_or(name) {
             "disc_column" | "stack" | "vertical_stack" | "circle_stack" | "far_stack" | "overlap_recovery"
             | "pyramid" | "large_pyramid" | "many_pyramids" | "arch" | "card_house" => SceneKind::Stacks,
             "washer" | "tumbler" | "junkyard" | "compounds" | "circle_pile" => SceneKind::Piles,

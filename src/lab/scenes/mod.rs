@@ -255,6 +255,11 @@ fn entry_of(name: &str) -> Result<(&'static Entry, u32), Error> {
     Ok((entry, entry.parse_size(size)?))
 }
 
+/// Whether a scene of the catalog has a random element.
+pub fn is_seeded(name: &str) -> bool {
+    entry_of(name).is_ok_and(|(entry, _)| entry.seeded.is_some())
+}
+
 /// As [`load`], for a run of this number of steps and step length `dt` (s), if given. The reference value is the one
 /// for that run.
 pub fn load_run(name: &str, seed: Option<u64>, steps: Option<u32>, dt: Option<f64>) -> Result<Loaded, Error> {

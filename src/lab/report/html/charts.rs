@@ -73,6 +73,24 @@ fn name(scene: &[Record], axis: ErrorAxis) -> Option<(String, &'static str)> {
     }
 }
 
+/// Every chart of a study that a paper may show, with a name for a file.
+pub fn figures(records: &[Record]) -> Vec<(String, Chart)> {
+    let named = |scene: &str, charts: Vec<Chart>| -> Vec<(String, Chart)> {
+        let safe: String = scene.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+        charts.into_iter().enumerate().map(|(i, chart)| (format!("{safe}-{}", i + 1), chart)).collect()
+    };
+    let swept = records.iter().find_map(|r| r.swept);
+    let mut all = Vec::new();
+    if swept.is_none() {
+        all.extend(overview(records).map(|chart| ("overview".to_string(), chart)));
+        all.extend(named("profile", profiles(records)));
+    }
+    for scene in scenes(records) {
+        all.extend(named(&scene[0].scene, swept.map_or_else(|| precision(scene), |swept| sweep(scene, swept))));
+    }
+    all
+}
+
 /// Time against each error of a scene.
 pub fn precision(scene: &[Record]) -> Vec<Chart> {
     let settings = answer::each_setting(scene);

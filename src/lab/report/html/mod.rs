@@ -11,8 +11,9 @@ mod matrix;
 
 use super::doc::{self, DocBlock, DocCell, DocTable, Tone};
 use super::style::Style;
-use super::{answer, by_scene, sweep};
+use super::{answer, by_scene, ensemble, sweep};
 use crate::engine::clock::Phase;
+use crate::lab::chart::figure::FigureStyle;
 use crate::lab::chart::{THEME, legend};
 use crate::lab::error::Error;
 use crate::lab::files;
@@ -59,14 +60,29 @@ pub fn write_recordings(folder: &Path, recordings: &[Vec<u8>]) -> Result<Vec<Pat
 pub fn write(folder: &Path, study: &StudyFile) -> Result<PathBuf, Error> {
     let matrix_path = folder.join("verify.json");
     let matrix: Option<VerifyFile> = if matrix_path.exists() { Some(read_json(&matrix_path)?) } else { None };
-    let mut recordings = Vec::new();
-    for path in (0..MOST).map(|i| folder.join(recording_name(i))).filter(|p| p.exists()) {
-        let (bytes, recording) = read_file(&path)?;
-        recordings.push((bytes, recording.header));
-    }
+    let recordings = recordings_of(folder)?;
     let path = folder.join(NAME);
     files::write(&path, page(study, matrix.as_ref(), &recordings).as_bytes())?;
     Ok(path)
+}
+
+/// Writes every chart of a study into `figures` in its folder; returns their paths.
+pub fn write_figures(folder: &Path, records: &[Record], style: &FigureStyle) -> Result<Vec<PathBuf>, Error> {
+    let folder = folder.join("figures");
+    files::prepare_folder(&folder)?;
+    let names: Vec<(&str, Style)> = solvers_of(records).into_iter().map(|name| (name, Style::of(name))).collect();
+    let write = |(name, chart)| {
+        let path = folder.join(format!("{name}.svg"));
+        files::write(&path, style.svg(&chart, &names).as_bytes()).map(|()| path)
+    };
+    charts::figures(records).into_iter().map(write).collect()
+}
+
+/// The recordings in a study's folder, with their headers. Errors: an invalid file.
+pub fn recordings_of(folder: &Path) -> Result<Vec<(Vec<u8>, Header)>, Error> {
+    let paths = (0..MOST).map(|i| folder.join(recording_name(i))).filter(|path| path.exists());
+    let read = |path: PathBuf| read_file(&path).map(|(bytes, recording)| (bytes, recording.header));
+    paths.map(read).collect()
 }
 
 fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, Error> {
@@ -111,6 +127,7 @@ fn sections(
     // Below the table with the answer of each scene.
     let first = answer.iter().position(|block| matches!(block, DocBlock::Table(_))).map_or(0, |i| i + 1);
     answer.insert(first, DocBlock::Table(by_scene::every_solver(records)));
+    answer.insert(first, DocBlock::Table(ensemble::table(records)));
     let overview = match charts::overview(records) {
         Some(chart) => vec![
             plain(
