@@ -11,7 +11,7 @@ use crate::lab::report::answer;
 use crate::lab::report::by_scene::brief_table;
 use crate::lab::report::doc::{self, DocBlock, DocTable, Tone, lines};
 use crate::lab::report::environment::Environment;
-use crate::lab::report::units::{quantity, ratio, si, si_short};
+use crate::lab::report::units::{percent, quantity, si, si_short};
 use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::study::answer::Answer;
 use crate::lab::study::{self, Record, StudyPlan, open_scene};
@@ -41,22 +41,23 @@ pub struct AdviseArgs {
     /// Scene
     #[arg(value_name = "SCENE", value_parser = values::scene(), help = scene_help())]
     pub scene: String,
-    /// Largest penetration allowed, such as 1mm: of 99 % of all contact points, and of every point in the last second
+    /// Largest overlap allowed, such as 1mm: of 99 % of all contact points, and of every point in the last second
     /// where the scene has to rest
-    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    #[arg(help_heading = "Limits", long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub max_penetration: Option<String>,
     /// Largest mean time of a step allowed, such as 500us
-    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
+    #[arg(help_heading = "Limits", long, value_name = "TIME", allow_hyphen_values = true)]
     pub max_time: Option<String>,
     /// Largest distance to the scene's reference value allowed
-    #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
+    #[arg(help_heading = "Limits", long, value_name = "VALUE", allow_hyphen_values = true)]
     pub max_reference: Option<String>,
-    /// Largest contact-law residual allowed: root mean square, in units of the lighter body's weight × step
-    #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
+    /// Largest force error allowed (how far contact impulses are from the contact law): root mean square, as a fraction of
+    /// the lighter body's weight
+    #[arg(help_heading = "Limits", long, value_name = "NUMBER", allow_hyphen_values = true)]
     pub max_residual: Option<String>,
     /// Largest rms speed allowed after one minute, where the scene has to rest [default: 0.5 % of a body size per
     /// second]
-    #[arg(long, value_name = "SPEED", allow_hyphen_values = true)]
+    #[arg(help_heading = "Limits", long, value_name = "SPEED", allow_hyphen_values = true)]
     pub max_rest_speed: Option<String>,
     /// Solvers
     #[command(flatten)]
@@ -64,21 +65,21 @@ pub struct AdviseArgs {
     /// Impacts
     #[command(flatten)]
     pub impacts: ImpactArgs,
-    /// Lanes per instruction; with 1 also natural order [default: the widest that this build has
+    /// Lanes per instruction; with 1 also file order [default: the widest that this build has
     /// instructions for; wider ones are emulated]
-    #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = values::lanes())]
+    #[arg(help_heading = "Solver and setting", long, value_delimiter = ',', value_name = "N,…", value_parser = values::lanes())]
     pub lanes: Vec<LaneWidth>,
     /// Steps of the runs that measure errors [default: those of the scene]
-    #[arg(long, value_name = "N")]
+    #[arg(help_heading = "Scene and time", long, value_name = "N")]
     pub steps: Option<u32>,
     /// Timing runs per setting
-    #[arg(long, value_name = "N", default_value_t = 5)]
+    #[arg(help_heading = "Measuring", long, value_name = "N", default_value_t = 5)]
     pub repeats: u32,
     /// Random seed: of scenes that have one, and of the order of timing runs
-    #[arg(long, default_value_t = 1)]
+    #[arg(help_heading = "Scene and time", long, default_value_t = 1)]
     pub seed: u64,
     /// Print JSON instead of text: everything that was timed
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     pub json: bool,
 }
 
@@ -197,8 +198,8 @@ fn limits(request: &Request, record: &Record) -> String {
     let rest = record.tolerances.rest.map(|t| t.value);
     let max_ns = Some(request.max_ns).filter(|ns| ns.is_finite());
     let parts = [
-        given.penetration.map(|p| format!("penetration ≤ {}", si_short(p, "m"))),
-        given.residual.map(|r| format!("residual ≤ {}", ratio(r))),
+        given.penetration.map(|p| format!("overlap ≤ {}", si_short(p, "m"))),
+        given.residual.map(|r| format!("force error ≤ {}", percent(r))),
         given.truth.map(|t| format!("distance to reference value ≤ {}", si_short(t, unit))),
         rest.map(|v| format!("stands for a minute, rest speed ≤ {}", si_short(v, "m/s"))),
         max_ns.map(|ns| format!("time ≤ {}", si_short(1e-9 * ns, "s"))),

@@ -13,6 +13,7 @@ use crate::lab::reference::certify::{Reference, reference};
 use crate::lab::reference::frozen::Frozen;
 use crate::lab::report::style::Style;
 use crate::lab::study::open_scene;
+use crate::lab::units::percent;
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -20,7 +21,7 @@ use std::process::ExitCode;
 
 /// Count the iterations every solver needs on one frozen problem
 ///
-/// Runs every solver on exactly the same contact problem, with 1, 2, 3, … iterations, in natural, colored and
+/// Runs every solver on exactly the same contact problem, with 1, 2, 3, … iterations, in file, parallel and
 /// shuffled order, from zero and warm. Warm starts are the impulses of the step before, if the problem has them;
 /// otherwise those of its certified reference, each changed by up to 10 %. Solvers with internal state first run 60
 /// steps on the previous step's problem. The output says which solver has no warm curve, and why.
@@ -31,13 +32,13 @@ use std::process::ExitCode;
 /// --solver, its budget, --set, --impacts and --without say how the steps before are solved; without it, --set
 /// applies to the compared solvers.
 ///
-/// Prints the sweeps per solver to 1e-2 and 1e-4, next to the f64 Gauss–Seidel rate; then iterations to
-/// residuals 1e-1 to 1e-6, the asymptotic rate, the distance of the velocities from the certified reference, and
-/// the time of an iteration. A dash means that a tolerance was not reached.
+/// Prints which solver needs the fewest sweeps, then a table of at most 20 rows: the sweeps of each to a force error
+/// of 1 % and 0.01 %, the factor per iteration at the end, the smallest force error, the distance of the velocities from
+/// the certified reference, and the time of an iteration.
 ///
-/// The residual is measured against two laws: the rigid contact law, which is the same for all, and
-/// the law that the solver itself set out to solve (soft contacts, position feedback, no friction).
-/// Where the two differ, a solver has two rows. Methods in f64 follow for comparison.
+/// The force error is how far impulses are from the contact law. It is measured against two laws: that of rigid
+/// contacts, which is the same for all, and the one that the solver itself set out to solve (soft contacts, position
+/// feedback, no friction). Where the two differ, a solver has two rows. Methods in f64 follow for comparison.
 ///
 /// Writes converge.csv (every point), converge.json (everything) and converge.svg (curves).
 #[derive(Args, Clone, Debug)]
@@ -45,8 +46,8 @@ use std::process::ExitCode;
 Examples:
   simpulse converge tests/frozen/disc-column-10.frozen
       A column of ten discs: the rate of Gauss-Seidel is cos²(π/20) = 0.9755.
-  simpulse converge pyramid:10 --step 120 --solvers pgs,soft_step
-      Freezes the step itself; only two solvers.
+  simpulse converge double_domino --step 60 --solvers pgs,soft_step
+      Dominoes that fall: freezes the step itself; only two solvers.
   simpulse converge pyramid:10 --step 120 --freeze pyramid.frozen
       Writes the problem of a pyramid that has come to rest after two seconds.
   simpulse converge my_scene.json --step 30 --freeze impact.frozen --solver pgs --velocity-iterations 50
@@ -58,10 +59,10 @@ pub struct ConvergeArgs {
     #[arg(value_name = "FILE|SCENE", value_parser = values::scene())]
     pub problem: String,
     /// Step to freeze if a scene is given, from 1; the steps before it are run
-    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(help_heading = "Scene and time", long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..))]
     pub step: u64,
     /// Write the frozen problem of a scene to this file and run no solver on it
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["solvers", "max_iterations", "lanes", "seed", "repeats", "out"])]
+    #[arg(help_heading = "Scene and time", long, value_name = "FILE", conflicts_with_all = ["solvers", "max_iterations", "lanes", "seed", "repeats", "out"])]
     pub freeze: Option<PathBuf>,
     /// How the steps before are solved
     #[command(flatten)]
@@ -70,22 +71,22 @@ pub struct ConvergeArgs {
     #[command(flatten)]
     pub solvers: Solvers,
     /// Maximum iterations
-    #[arg(long, value_name = "K", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(help_heading = "Measuring", long, value_name = "K", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub max_iterations: u32,
-    /// Lanes in colored order
+    /// Lanes in parallel order
     #[command(flatten)]
     pub lanes: LaneArgs,
     /// Seed of the shuffled order
-    #[arg(long, default_value_t = 1)]
+    #[arg(help_heading = "Measuring", long, default_value_t = 1)]
     pub seed: u64,
     /// Timing runs per curve; 0 skips timing
-    #[arg(long, value_name = "N", default_value_t = 15)]
+    #[arg(help_heading = "Measuring", long, value_name = "N", default_value_t = 15)]
     pub repeats: u32,
     /// Folder for converge.csv, converge.json and converge.svg
-    #[arg(long, value_name = "FOLDER", default_value = "results")]
+    #[arg(help_heading = "Output", long, value_name = "FOLDER", default_value = "results")]
     pub out: PathBuf,
     /// Print JSON instead of text: what converge.json holds, or what --freeze found
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     pub json: bool,
 }
 
@@ -203,7 +204,7 @@ fn freeze(args: &ConvergeArgs, file: &Path) -> Result<ExitCode, Error> {
     }
     let found = match (reference, why_not) {
         (Some(Reference { certificate: c, .. }), _) => {
-            format!("reference: {}, natural-map residual {:.1e}", c.method, c.natural_map)
+            format!("reference: {}, force error {}", c.method, percent(c.natural_map))
         }
         (None, why) => format!("written without a reference: {}", why.unwrap_or_default()),
     };

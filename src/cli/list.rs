@@ -9,7 +9,7 @@ use crate::lab::report::columns::{self, Column, SHEETS, Sheet};
 use crate::lab::scenes::tolerance::Tolerance;
 use crate::lab::scenes::{self, CATALOG, Loaded};
 use crate::lab::study::{DEFAULT_SOLVERS, budget, open_scene};
-use crate::lab::units::{bodies, count, si};
+use crate::lab::units::{bodies, count, percent, si};
 use clap::Args;
 use serde_json::{Value, json};
 use std::process::ExitCode;
@@ -174,17 +174,17 @@ fn described(loaded: &Loaded) -> String {
     for demand in demands {
         text += &format!("; {}", demand.meaning());
     }
-    text += "\ntolerances of a plausible run; a tight run is within 10 % of them, an exact run within 1 %\n";
+    text += "\ngood enough within these tolerances; 10 × and 100 × tighter: within 10 % and 1 % of them\n";
     let unit = truth.as_ref().map_or("", |known| known.unit);
     let lines = [
-        ("penetration", Some((own.penetration, "m"))),
-        ("residual", Some((own.residual, ""))),
+        ("overlap", Some((own.penetration, "m"))),
+        ("force error", Some((own.residual, "%"))),
         ("reference", own.truth.map(|t| (t, unit))),
         ("rest speed", own.rest.map(|t| (t, "m/s"))),
     ];
     for (name, line) in lines {
         let Some((Tolerance { value, reason, fixed }, unit)) = line else { continue };
-        let value = if unit.is_empty() { format!("{value} body weights") } else { si(value, unit) };
+        let value = if unit == "%" { format!("{} of a body's weight", percent(value)) } else { si(value, unit) };
         let fixed = if fixed { " (at every accuracy)" } else { "" };
         text += &format!("  {name:<12} {value}: {reason}{fixed}\n");
     }

@@ -19,16 +19,16 @@ use std::process::ExitCode;
 pub struct PictureArgs {
     /// Draw one frame instead of measuring: bodies colored by their deepest overlap; every contact point with its
     /// normal and an arrow for the impulse of the step on the upper body; `-` is standard output
-    #[arg(long, value_name = "FILE.svg", conflicts_with_all = ["record", "state", "contacts", "joints", "steps", "every", "all", "json"])]
+    #[arg(help_heading = "Output", long, value_name = "FILE.svg", conflicts_with_all = ["record", "state", "contacts", "joints", "steps", "every", "all", "json"])]
     pub picture: Option<PathBuf>,
     /// Step after which the picture is taken; 0 is the start [default: 60]
-    #[arg(long, value_name = "N", requires = "picture")]
+    #[arg(help_heading = "Output", long, value_name = "N", requires = "picture")]
     pub step: Option<u32>,
     /// Width of the picture in pixels [default: 1200]
-    #[arg(long, value_name = "PIXELS", requires = "picture")]
+    #[arg(help_heading = "Output", long, value_name = "PIXELS", requires = "picture")]
     pub width: Option<u32>,
     /// Penetration that has the darkest color, the same in every picture, so that they compare [default: 10mm]
-    #[arg(long, value_name = "LENGTH", requires = "picture")]
+    #[arg(help_heading = "Output", long, value_name = "LENGTH", requires = "picture")]
     pub scale: Option<String>,
 }
 

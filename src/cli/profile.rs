@@ -38,7 +38,7 @@ pub struct ProfileArgs {
     #[arg(value_name = "SCENE", num_args = 1.., required = true, value_parser = values::scene(), help = scene_help())]
     pub scenes: Vec<String>,
     /// Duration of the measurement of a scene (s)
-    #[arg(long, default_value_t = 5.0, value_name = "S", allow_negative_numbers = true)]
+    #[arg(help_heading = "Measuring", long, default_value_t = 5.0, value_name = "S", allow_negative_numbers = true)]
     pub seconds: f64,
     /// Solver, budget and parameters
     #[command(flatten)]
@@ -50,16 +50,16 @@ pub struct ProfileArgs {
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = values::threads())]
     pub threads: usize,
     /// Steps before the state is measured
-    #[arg(long, default_value_t = 60, value_name = "STEPS")]
+    #[arg(help_heading = "Scene and time", long, default_value_t = 60, value_name = "STEPS")]
     pub settle: u32,
     /// Random seed of scenes that have one
-    #[arg(long)]
+    #[arg(help_heading = "Scene and time", long)]
     pub seed: Option<u64>,
     /// Skip the measurement of memory bandwidth and arithmetic
-    #[arg(long)]
+    #[arg(help_heading = "Measuring", long)]
     pub no_ceilings: bool,
     /// Print JSON instead of text
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     pub json: bool,
 }
 

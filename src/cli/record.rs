@@ -23,13 +23,13 @@ use std::process::ExitCode;
 pub struct RecordArgs {
     /// Write a page that plays the run, instead of measuring: play, pause, step, zoom with the wheel, drag; error
     /// curves below; one file that needs no network
-    #[arg(long, value_name = "FILE.html", conflicts_with_all = ["state", "contacts", "joints", "all", "json"])]
+    #[arg(help_heading = "Output", long, value_name = "FILE.html", conflicts_with_all = ["state", "contacts", "joints", "all", "json"])]
     pub record: Option<PathBuf>,
     /// Solvers that are played side by side, at most four
-    #[arg(long, value_name = "SOLVER,…", value_delimiter = ',', value_parser = values::solver(), requires = "record", conflicts_with = "solver")]
+    #[arg(help_heading = "Output", long, value_name = "SOLVER,…", value_delimiter = ',', value_parser = values::solver(), requires = "record", conflicts_with = "solver")]
     pub solvers: Vec<&'static Variant>,
     /// Also record contact points and impulses
-    #[arg(long, requires = "record")]
+    #[arg(help_heading = "Output", long, requires = "record")]
     pub record_contacts: bool,
 }
 

@@ -18,7 +18,7 @@ use crate::lab::overrides;
 use crate::lab::pokes;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::table::error_list;
-use crate::lab::report::units::{bodies, lanes, ratio, si};
+use crate::lab::report::units::{self, bodies, lanes_or_order, percent, ratio, si};
 use crate::lab::scenes::holds::Broken;
 use crate::lab::scenes::{Loaded, Scene};
 use crate::lab::study::{FailedAt, TruthError, budget, open_scene};
@@ -31,9 +31,8 @@ use std::process::ExitCode;
 
 /// Run one scene with one solver; print its time and its errors
 ///
-/// Prints the key figures: the time of a step and of its longest phase, the maximum penetration, the contact-law
-/// residual, the distance to the scene's reference value, the residual speed at rest, the change of energy, and
-/// whether the scene holds. `--all` prints the rest.
+/// Prints the key figures: the time of a step and of its longest phase, the overlap, the force error, the distance to
+/// the scene's reference value, the speed that remains at rest, the change of energy, and whether the scene holds. `--all` prints the rest.
 #[derive(Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -52,36 +51,36 @@ pub struct RunArgs {
     /// Solver, budget and parameters
     #[command(flatten)]
     pub setting: SettingArgs,
-    /// Lanes per instruction [default: as many as the colors fill and the build has instructions for, 1 in natural
+    /// Lanes per instruction [default: as many as the colors fill and the build has instructions for, 1 in file
     /// order; wider ones are emulated]
-    #[arg(long, value_name = "N", value_parser = values::lanes())]
+    #[arg(help_heading = "Solver and setting", long, value_name = "N", value_parser = values::lanes())]
     pub lanes: Option<LaneWidth>,
     /// Constraint order
-    #[arg(long, default_value = "colored", value_name = "ORDER", value_parser = values::order())]
+    #[arg(help_heading = "Solver and setting", long, default_value = "parallel", value_name = "ORDER", value_parser = values::order())]
     pub order: Order,
     /// Threads that share each step; every number gives the same bits
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = values::threads())]
     pub threads: usize,
     /// Steps [default: those of the scene]
-    #[arg(long, value_name = "N")]
+    #[arg(help_heading = "Scene and time", long, value_name = "N")]
     pub steps: Option<u32>,
     /// Step in seconds [default: that of the scene]
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(help_heading = "Scene and time", long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub dt: Option<f64>,
     /// Random seed of scenes that have one
-    #[arg(long)]
+    #[arg(help_heading = "Scene and time", long)]
     pub seed: Option<u64>,
     /// Write a CSV of step,time,body,x,y,angle,vx,vy,omega; angles include whole turns
-    #[arg(long, value_name = "FILE.csv")]
+    #[arg(help_heading = "Output", long, value_name = "FILE.csv")]
     pub state: Option<PathBuf>,
     /// Write a CSV of contact points with their impulses (N·s over the step)
-    #[arg(long, value_name = "FILE.csv")]
+    #[arg(help_heading = "Output", long, value_name = "FILE.csv")]
     pub contacts: Option<PathBuf>,
     /// Write a CSV of joints with their gaps, angles, impulses by row (N·s over the step) and loads
-    #[arg(long, value_name = "FILE.csv")]
+    #[arg(help_heading = "Output", long, value_name = "FILE.csv")]
     pub joints: Option<PathBuf>,
     /// Write the phases of every step as a Chrome trace (JSON), for Perfetto and similar viewers
-    #[arg(long, value_name = "FILE.json", conflicts_with_all = ["picture", "record"])]
+    #[arg(help_heading = "Output", long, value_name = "FILE.json", conflicts_with_all = ["picture", "record"])]
     pub trace: Option<PathBuf>,
     /// Picture of a frame
     #[command(flatten)]
@@ -90,20 +89,20 @@ pub struct RunArgs {
     #[command(flatten)]
     pub record: RecordArgs,
     /// Write every K-th step [default: the last step only in CSV files, every step in a recording]
-    #[arg(long, value_name = "K")]
+    #[arg(help_heading = "Output", long, value_name = "K")]
     pub every: Option<u32>,
     /// Continuous collision: stop fast bodies at the surfaces that they would pass through [default: the solver's]
-    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    #[arg(help_heading = "Solver and setting", long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pub continuous: Option<bool>,
     /// Push random bodies at random times in the first half of the run, as a player would; the seed decides which and
     /// when. The figures are those of the poked run, and bodies are compared with an unpoked one
-    #[arg(long, value_name = "SEED", conflicts_with_all = ["picture", "record"])]
+    #[arg(help_heading = "Scene and time", long, value_name = "SEED", conflicts_with_all = ["picture", "record"])]
     pub poke: Option<u64>,
     /// Print all phases, counts and errors
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     pub all: bool,
     /// Print JSON instead of text: everything
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     pub json: bool,
 }
 
@@ -244,7 +243,7 @@ pub(super) fn settings(args: &RunArgs, own: Settings) -> Result<Settings, Error>
         (Order::Colored, None) => own,
         (_, None | Some(LaneWidth::W1)) => own.exactly(LaneWidth::W1),
         (order, Some(width)) => {
-            let message = format!("{}, but {} order has 1 lane", width.lanes(), order.name());
+            let message = format!("{}, but {} order has 1 lane", width.lanes(), units::order(order));
             return Err(Error::invalid("lanes", message));
         }
     };
@@ -261,11 +260,11 @@ impl RunResult {
     /// |---|---|
     /// | time of a step | whether the budget can be afforded at all |
     /// | longest phase | whether fewer sweeps, more lanes or another broad phase would help |
-    /// | maximum penetration | more substeps or stiffer contacts: overlap is the visible error |
-    /// | contact-law residual | more sweeps: loads and friction are no more accurate than this |
-    /// | distance to reference value | another solver: a small residual of the wrong law is still wrong |
+    /// | overlap | more substeps or stiffer contacts: it is the visible error |
+    /// | force error | more sweeps: loads and friction are no more accurate than this |
+    /// | distance to reference value | another solver: small errors under the wrong law are still wrong |
     /// | holds | if it does not, no other figure matters |
-    /// | residual speed | whether bodies could sleep, or jitter |
+    /// | speed at rest | whether bodies could sleep, or jitter |
     /// | energy change | damping: a gain ends in an explosion, a loss looks viscous |
     ///
     /// `--all` prints the others, each of which explains one of these.
@@ -282,7 +281,7 @@ impl RunResult {
             let why = "of steps: too many points for the solver's own method".into();
             lines.push(("solved by sweeps alone", format!("{:.0} %", 100.0 * sample.load.unsolved), why));
         }
-        let name = if self.rests { "penetration, 99 % and at rest" } else { "penetration, 99 % of points" };
+        let name = if self.rests { "overlap, 99 % and at rest" } else { "overlap that the solver left, 99 %" };
         let [most, first] = ["penetration_max_m", "flight_depth_max_m"].map(|name| si(at(name), "m"));
         lines.extend([
             ("error", String::new(), String::new()),
@@ -316,9 +315,9 @@ impl RunResult {
         };
         lines.extend([
             (
-                "contact-law residual, rms",
-                ratio(e.law_rms_lighter()),
-                "weights of the lighter body × step".into(),
+                "force error, rms",
+                percent(e.law_rms_lighter()),
+                "of the lighter body's weight; distance of contact impulses from the contact law".into(),
             ),
             ("distance to reference value", distance, known),
             ("behavior", String::new(), String::new()),
@@ -327,7 +326,7 @@ impl RunResult {
                 self.broken.map_or(yes.into(), |broken| broken.mark.word().into()),
                 self.broken.map_or(String::new(), |broken| format!("at step {}", broken.step)),
             ),
-            ("residual speed, last second", si(e.rest_velocity(), "m/s"), "rms".into()),
+            ("speed at rest, last second", si(e.rest_velocity(), "m/s"), "rms".into()),
             ("energy change", ratio(at("energy_change")), "relative; positive is a gain".into()),
         ]);
         if let Some(Poked { seed, pushes, displaced_rms_m, displaced_max_m }) = &self.poked {
@@ -401,10 +400,7 @@ fn json(world: &World, scene: &Scene, found: &RunResult) -> Result<Value, Error>
 /// Budget, and order or lanes, as text.
 pub(super) fn how(world: &World) -> String {
     let s = &world.settings;
-    let order = match s.order {
-        Order::Colored => lanes(world.lane_width().lanes()),
-        order => format!("{} order", order.name()),
-    };
+    let order = lanes_or_order(s.order, world.lane_width().lanes());
     format!("{}, {order}", budget::with_treatments(budget::brief(&s.budget, s.solver), s.impacts, s.frozen))
 }
 

@@ -9,12 +9,13 @@ use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::narrowphase::frozen::Freezing;
 use crate::engine::solvers::Variant;
 use crate::engine::world::Order;
+use crate::lab::chart::figure::FigureStyle;
 use crate::lab::error::Error;
 use crate::lab::files;
 use crate::lab::overrides::{self, Override};
 use crate::lab::report::doc::{self, DocBlock};
 use crate::lab::report::study_file::{StudyFile, differing_settings, settings};
-use crate::lab::report::{self, answer, by_scene, html, sweep};
+use crate::lab::report::{self, answer, by_scene, ensemble, html, sweep};
 use crate::lab::scenes::tolerance::GivenTolerances;
 use crate::lab::study::budget::BudgetGrid;
 use crate::lab::study::curve::distinct;
@@ -22,7 +23,7 @@ use crate::lab::study::found::{self, Found, FoundSetting};
 use crate::lab::study::record::quoted;
 use crate::lab::study::sweep::QuantitySweep;
 use crate::lab::study::{self, Progress, Record, StudyPlan, telling};
-use crate::lab::units::quantity;
+use crate::lab::units::{count, quantity};
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 use std::path::{Path, PathBuf};
@@ -38,7 +39,7 @@ repeats it). On other scenes it runs at half, once and twice its standard budget
 options, every combination runs; values that a solver ignores are dropped.
 A folder keeps every study: what it holds is moved to FOLDER/previous/N when the first scene of another study
 is finished. Each scene is written as soon as it is finished; --resume runs those that are missing.
-A sweep runs at each solver's standard budget, in colored order at the widest native lanes, unless
+A sweep runs at each solver's standard budget, in parallel order at the widest native lanes, unless
 other options say otherwise.
 
 Examples:
@@ -55,105 +56,131 @@ Examples:
   simpulse study --scenes stack:20,my.json --velocity-iterations 4,16,64 --out results/stack
   simpulse study --scenes my.json --solvers all --thorough --out results/my
   simpulse study --scenes stack:20,arch --frozen off --frozen own --frozen 1mm,0.004,loaded --out results/frozen
-  simpulse study --scenes pyramid:20 --standard --orders natural,reversed,shuffled,colored --out results/orders";
+  simpulse study --scenes pyramid:20 --standard --orders file,reversed,shuffled,parallel --out results/orders";
 
 /// Lists are separated by commas.
 #[derive(Args, Debug)]
 pub struct StudyArgs {
     /// Scenes
-    #[arg(long, value_delimiter = ',', value_name = "SCENE,…", value_parser = values::scene(), help = values::scenes_help())]
+    #[arg(help_heading = "Scene and time", long, value_delimiter = ',', value_name = "SCENE,…", value_parser = values::scene(), help = values::scenes_help())]
     pub scenes: Vec<String>,
     /// Solvers
     #[command(flatten)]
     pub solvers: Solvers,
     /// Lanes per instruction [default: 1, 4, 8, and 16 where this build has instructions for it;
     /// wider ones are emulated]
-    #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = values::lanes())]
+    #[arg(help_heading = "Solver and setting", long, value_delimiter = ',', value_name = "N,…", value_parser = values::lanes())]
     pub lanes: Vec<LaneWidth>,
-    /// Constraint orders [default: natural,colored]
-    #[arg(long, value_delimiter = ',', value_name = "ORDER,…", value_parser = values::order())]
+    /// Orders of constraints: file (one after the other, as they are found), reversed, shuffled, and parallel (by
+    /// colors, in lanes) [default: file,parallel]
+    #[arg(help_heading = "Solver and setting", long, value_delimiter = ',', value_name = "ORDER,…", value_parser = values::order())]
     pub orders: Vec<Order>,
     /// Impact laws: own is the solver's, waves solves impacts in waves before the step, none turns bouncing off.
     /// Scenes where nothing bounces run the first one only [default: own,waves; in a sweep own]
-    #[arg(long, value_delimiter = ',', value_name = "TREATMENT,…", value_parser = values::impacts())]
+    #[arg(help_heading = "Solver and setting", long, value_delimiter = ',', value_name = "TREATMENT,…", value_parser = values::impacts())]
     pub impacts: Vec<Impacts>,
     /// Frozen contacts, the option once for each: own is the solver's, off is never, DISTANCE,TURN within such a motion
     /// (1mm,0.004), and DISTANCE,TURN,loaded only where both points of a contact bear load [default: own]
-    #[arg(long, value_name = "LIMITS", value_parser = values::frozen)]
+    #[arg(help_heading = "Solver and setting", long, value_name = "LIMITS", value_parser = values::frozen)]
     pub frozen: Vec<Freezing>,
     /// Substeps to try
-    #[arg(long, value_delimiter = ',', value_name = "N,…")]
+    #[arg(help_heading = "Solver and setting", long, value_delimiter = ',', value_name = "N,…")]
     pub substeps: Vec<u32>,
     /// Velocity sweeps to try, per substep
-    #[arg(long, value_delimiter = ',', value_name = "N,…")]
+    #[arg(help_heading = "Solver and setting", long, value_delimiter = ',', value_name = "N,…")]
     pub velocity_iterations: Vec<u32>,
     /// Relaxation sweeps to try, per substep
-    #[arg(long, value_delimiter = ',', value_name = "N,…")]
+    #[arg(help_heading = "Solver and setting", long, value_delimiter = ',', value_name = "N,…")]
     pub relax_iterations: Vec<u32>,
     /// Position sweeps to try, per substep
-    #[arg(long, value_delimiter = ',', value_name = "N,…")]
+    #[arg(help_heading = "Solver and setting", long, value_delimiter = ',', value_name = "N,…")]
     pub position_iterations: Vec<u32>,
     /// Solver parameters, such as `contact_hertz=60` (`simpulse list solvers` lists them)
-    #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
+    #[arg(help_heading = "Solver and setting", long, value_name = "NAME=VALUE,…", value_delimiter = ',')]
     pub set: Vec<Override>,
     /// A curve per solver: one quantity takes several values, all else stays fixed. It is a solver parameter
     /// (contact-hertz), substeps, iterations (velocity sweeps; position sweeps if a solver has no others),
     /// velocity-iterations, relax-iterations, position-iterations, dt (s), friction (of every shape), mass-ratio
     /// (scene mass_ratio), or size (of scenes that have one; the table has the time per contact)
-    #[arg(long, value_name = "NAME=VALUE,VALUE,…")]
+    #[arg(help_heading = "Measuring", long, value_name = "NAME=VALUE,VALUE,…")]
     pub sweep: Option<QuantitySweep>,
     /// Compare kernels for the features of the scenes (0) with kernels for all features (1), which take the time of
     /// friction, second points, rotation and restitution where a scene has none
-    #[arg(long, value_name = "all", value_parser = ["all"], conflicts_with = "sweep")]
+    #[arg(help_heading = "Measuring", long, value_name = "all", value_parser = ["all"], conflicts_with = "sweep")]
     pub features: Option<String>,
-    /// Override the scenes' tolerances, such as penetration=5mm,residual=0.05,reference=0.1 (`simpulse list NAME`
-    /// lists them; that of the reference value has the value's unit)
-    #[arg(long, value_delimiter = ',', value_name = "NAME=VALUE,…", value_parser = NonEmptyStringValueParser::new())]
+    /// Override the scenes' tolerances, such as penetration=5mm,residual=0.05 (overlap, force error),reference=0.1
+    /// (`simpulse list NAME` lists them; that of the reference value has the value's unit)
+    #[arg(help_heading = "Measuring", long, value_delimiter = ',', value_name = "NAME=VALUE,…", value_parser = NonEmptyStringValueParser::new())]
     pub tolerance: Vec<String>,
     /// Steps of the runs that measure errors [default: those of each scene]
-    #[arg(long)]
+    #[arg(help_heading = "Scene and time", long)]
     pub steps: Option<u32>,
     /// Rounds of timing, common to all settings of a scene [default: 3]
-    #[arg(long)]
+    #[arg(help_heading = "Measuring", long)]
     pub repeats: Option<u32>,
     /// Random seed: of scenes that have one, and of the order of timing runs
-    #[arg(long, default_value_t = 1)]
+    #[arg(help_heading = "Scene and time", long, default_value_t = 1)]
     pub seed: u64,
+    /// Run every scene from each of these seeds, and report means with 95 % confidence intervals; scenes without a random
+    /// element start with random speeds of up to 1 mm/s instead. SCENE@SEED is one of them
+    #[arg(help_heading = "Measuring", long, value_name = "FIRST-LAST", conflicts_with = "sweep")]
+    pub seeds: Option<SeedRange>,
     /// Short runs without repeats: an overview in seconds
-    #[arg(long)]
+    #[arg(help_heading = "Measuring", long)]
     pub quick: bool,
     /// First search the settings of each solver on each scene, by errors alone. Writes them to budgets.csv in the
     /// folder
-    #[arg(long, conflicts_with_all = ["sweep", "features", "substeps", "velocity_iterations", "relax_iterations", "position_iterations"])]
+    #[arg(help_heading = "Solver and setting", long, conflicts_with_all = ["sweep", "features", "substeps", "velocity_iterations", "relax_iterations", "position_iterations"])]
     pub thorough: bool,
     /// Each solver at half, once and twice its standard budget, whatever was found
-    #[arg(long, conflicts_with = "thorough")]
+    #[arg(help_heading = "Solver and setting", long, conflicts_with = "thorough")]
     pub standard: bool,
     /// Print JSON instead of text: what study.json holds
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     pub json: bool,
     /// Run part I of N: every N-th scene; --merge joins the parts
-    #[arg(long, value_name = "I/N")]
+    #[arg(help_heading = "Parts", long, value_name = "I/N")]
     pub shard: Option<Shard>,
     /// Go on with the study in the folder: run the scenes that it lacks. It must be the same study
-    #[arg(long)]
+    #[arg(help_heading = "Parts", long)]
     pub resume: bool,
     /// Run nothing: merge these parts, folders or study.json files. All times of a scene come from one machine
-    #[arg(long, value_delimiter = ',', num_args = 1.., value_name = "DIR", conflicts_with_all = ["shard", "resume", "from"])]
+    #[arg(help_heading = "Parts", long, value_delimiter = ',', num_args = 1.., value_name = "DIR", conflicts_with_all = ["shard", "resume", "from"])]
     pub merge: Vec<PathBuf>,
     /// Merge even if scenes are missing
-    #[arg(long, requires = "merge")]
+    #[arg(help_heading = "Parts", long, requires = "merge")]
     pub partial: bool,
     /// Run nothing: write the page of the study in this folder again, with the folder's verify.json (`simpulse verify
     /// --json > DIR/verify.json`) and recordings if it has them
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["shard", "resume"])]
+    #[arg(help_heading = "Output", long, value_name = "DIR", conflicts_with_all = ["shard", "resume"])]
     pub from: Option<PathBuf>,
+    /// Also write every chart as an SVG of this size into figures/, such as 85mm or 85mmx60mm (mm, cm or in)
+    #[arg(help_heading = "Output", long, value_name = "WIDTH[xHEIGHT]")]
+    pub figure: Option<String>,
+    /// Font of the figures
+    #[arg(help_heading = "Output", long, value_name = "NAME", default_value = "sans-serif", requires = "figure")]
+    pub font: String,
+    /// Size of the type in the figures (pt)
+    #[arg(help_heading = "Output", long, value_name = "POINTS", default_value_t = 8.0, requires = "figure")]
+    pub font_size: f64,
     /// Folder for the results
-    #[arg(long, default_value = "results", value_name = "FOLDER")]
+    #[arg(help_heading = "Output", long, default_value = "results", value_name = "FOLDER")]
     pub out: PathBuf,
 }
 
 impl StudyArgs {
+    /// Size and type of figures; `None` if none are wanted. Errors: a size that cannot be drawn.
+    fn figure_style(&self) -> Result<Option<FigureStyle>, Error> {
+        self.figure.as_ref().map(|size| FigureStyle::new(size, &self.font, self.font_size)).transpose()
+    }
+
+    /// Writes the figures into a folder, if they are wanted; returns words about them.
+    fn figures(&self, folder: &Path, records: &[Record]) -> Result<String, Error> {
+        let Some(style) = self.figure_style()? else { return Ok(String::new()) };
+        let paths = html::write_figures(folder, records, &style)?;
+        Ok(format!(", {} in {}", count(paths.len(), "figure"), folder.join("figures").display()))
+    }
+
     /// The plan for these arguments. Errors: unknown names, invalid widths.
     pub fn plan(&self) -> Result<StudyPlan, Error> {
         let mut base = if self.quick { StudyPlan::quick() } else { StudyPlan::default() };
@@ -165,8 +192,9 @@ impl StudyArgs {
         let or = |given: &[String], own: Vec<String>| {
             if given.is_empty() { own } else { distinct(given.iter().cloned()) }
         };
+        let scenes = or(&self.scenes, base.scenes);
         Ok(StudyPlan {
-            scenes: or(&self.scenes, base.scenes),
+            scenes: self.seeds.map_or(scenes.clone(), |seeds| seeds.of(&scenes)),
             solvers: self.solvers.chosen(),
             widths: values::widths(&self.lanes, base.widths),
             orders: if self.orders.is_empty() { base.orders } else { distinct(self.orders.clone()) },
@@ -217,6 +245,34 @@ fn tolerances(given: &[String]) -> Result<GivenTolerances, Error> {
     Ok(tolerances)
 }
 
+/// Most seeds of an ensemble.
+const MOST_SEEDS: u64 = 1000;
+
+/// Seeds of an ensemble, both ends included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SeedRange {
+    first: u64,
+    last: u64,
+}
+
+impl FromStr for SeedRange {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = text.split_once('-').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+        let found = found.filter(|(first, last)| first < last && last - first < MOST_SEEDS);
+        let (first, last) = found.ok_or_else(|| format!("'{text}' is not FIRST-LAST, for example 1-20, of at most 1000"))?;
+        Ok(SeedRange { first, last })
+    }
+}
+
+impl SeedRange {
+    /// Each scene from each seed.
+    fn of(self, scenes: &[String]) -> Vec<String> {
+        scenes.iter().flat_map(|name| (self.first..=self.last).map(move |seed| format!("{name}@{seed}"))).collect()
+    }
+}
+
 /// A part of a study. It consists of whole scenes, so that all times of a scene come from one machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
@@ -253,12 +309,14 @@ impl Shard {
 
 /// Runs the command.
 pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
+    args.figure_style()?;
     if let Some(folder) = &args.from {
         let study = StudyFile::read(folder)?;
         let page = html::write(folder, &study)?;
+        let figures = args.figures(folder, &study.records)?;
         return match args.json {
             true => print(&String::from_utf8_lossy(&study.to_json()?)),
-            false => print(&format!("wrote {}\n", page.display())),
+            false => print(&format!("wrote {}{figures}\n", page.display())),
         };
     }
     if !args.merge.is_empty() {
@@ -402,18 +460,67 @@ fn resumed(earlier: StudyFile, out: &Path, plan: &StudyPlan) -> Result<StudyFile
 fn merge(args: &StudyArgs) -> Result<ExitCode, Error> {
     let parts = args.merge.iter().map(|path| StudyFile::read(path)).collect::<Result<Vec<_>, _>>()?;
     let names: Vec<String> = args.merge.iter().map(|path| path.display().to_string()).collect();
+    let commands: Vec<String> = parts.iter().map(|part| part.command.clone()).collect();
     let whole = StudyFile { command: command_line(), ..StudyFile::merged(parts, &names)? };
     if !whole.missing_scenes.is_empty() && !args.partial {
         let missing = whole.missing_scenes.join(", ");
-        let message = format!("no part has {missing}; --partial merges without it");
+        let made_by = missing_parts(&commands).join("; ");
+        let message = format!("no part has {missing}; to make it: {made_by}; --partial merges without it");
         return Err(Error::invalid("merge", message));
     }
     files::prepare_folder(&args.out)?;
     let _lock = files::Lock::of(&args.out)?;
     let _writing = interrupt::writing();
+    let replays = replays_of(&args.merge, &whole)?;
     let kept = report::keep_previous(&args.out)?;
-    let paths = report::write_study(&args.out, &whole)?;
+    let replays = html::write_recordings(&args.out, &replays)?;
+    let mut paths = report::write_study(&args.out, &whole)?;
+    paths.extend(replays);
     finish(args, &whole, &paths, String::new(), &kept)
+}
+
+/// The recordings of the parts: those of the scene where the solvers differ most, or of the first scene that has some.
+fn replays_of(parts: &[PathBuf], whole: &StudyFile) -> Result<Vec<Vec<u8>>, Error> {
+    let mut all = Vec::new();
+    for folder in parts.iter().filter(|path| path.is_dir()) {
+        all.extend(html::recordings_of(folder)?);
+    }
+    let told = telling::telling(&whole.records).first().map(|record| record.scene.clone());
+    let has = |scene: &String| all.iter().any(|(_, header)| header.scene == *scene);
+    let scene = told.filter(has).or(all.first().map(|(_, header)| header.scene.clone()));
+    all.retain(|(_, header)| Some(&header.scene) == scene.as_ref());
+    Ok(all.into_iter().map(|(bytes, _)| bytes).collect())
+}
+
+/// Commands that make the parts that are missing, from those of the others: the shards that none of them ran, or else
+/// each of them again with --resume.
+fn missing_parts(commands: &[String]) -> Vec<String> {
+    let shard = |command: &String| -> Option<Shard> {
+        let mut words = command.split([' ', '=']).skip_while(|word| *word != "--shard");
+        words.nth(1)?.parse().ok()
+    };
+    let present: Vec<Shard> = commands.iter().filter_map(shard).collect();
+    let command = commands.iter().find(|command| shard(command).is_some());
+    if let (Some(first), Some(command)) = (present.first(), command) {
+        let base: Vec<&str> = command.split(' ').collect();
+        let missing = (1..=first.count).filter(|index| present.iter().all(|own| own.index != *index));
+        let of = |index: usize| {
+            let (mut text, mut skip) = (Vec::new(), false);
+            for word in &base {
+                let is_option = ["--shard", "--out"].into_iter().any(|name| word.starts_with(name));
+                if !skip && !is_option {
+                    text.push(*word);
+                }
+                skip = is_option && !word.contains('=');
+            }
+            format!("{} --shard {index}/{} --out part-{index}", text.join(" "), first.count)
+        };
+        let list: Vec<String> = missing.map(of).collect();
+        if !list.is_empty() {
+            return list;
+        }
+    }
+    commands.iter().filter(|command| !command.is_empty()).map(|command| format!("{command} --resume")).collect()
 }
 
 /// Drops solvers that do not have the swept quantity, and returns a message about them.
@@ -440,6 +547,7 @@ fn finish(
     first: String,
     kept: &Option<PathBuf>,
 ) -> Result<ExitCode, Error> {
+    let figures = args.figures(&args.out, &study.records)?;
     if args.json {
         return print(&String::from_utf8_lossy(&study.to_json()?));
     }
@@ -449,12 +557,13 @@ fn finish(
         true => sweep::text(records, environment),
         false => answer::text(records, environment, study.steps()),
     };
+    text += &doc::text(&[DocBlock::Table(ensemble::table(records))]);
     text += &doc::lines(&study.budgets());
     text +=
         &doc::text(&by_scene::chosen_tables(records).into_iter().map(DocBlock::Table).collect::<Vec<_>>());
     let names = paths.iter().filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned()));
     let names = names.collect::<Vec<_>>().join(", ");
-    text += &doc::lines(&format!("\nwrote {names} in {}\n", args.out.display()));
+    text += &doc::lines(&format!("\nwrote {names} in {}{figures}\n", args.out.display()));
     if let Some(place) = kept {
         text += &format!("the study that was there is now in {}\n", place.display());
     }
@@ -479,6 +588,15 @@ mod tests {
         assert_eq!(all, scenes);
         for bad in ["0/3", "4/3", "1", "a/b", "1/0", "-1/2", ""] {
             assert!(bad.parse::<Shard>().is_err_and(|e| e.contains(bad)), "{bad}");
+        }
+        let commands = ["simpulse study --quick --shard 1/3 --out p1", "simpulse study --quick --shard=3/3 --out=p3"];
+        let commands = commands.map(String::from);
+        assert_eq!(missing_parts(&commands), ["simpulse study --quick --shard 2/3 --out part-2"]);
+        assert_eq!(missing_parts(&["simpulse study --out x".into()]), ["simpulse study --out x --resume"]);
+        let seeds: SeedRange = "3-5".parse().unwrap();
+        assert_eq!(seeds.of(&["a".into()]), ["a@3", "a@4", "a@5"]);
+        for bad in ["3", "5-3", "3-3", "a-b", "1-", "0-1000", "-1-2"] {
+            assert!(bad.parse::<SeedRange>().is_err_and(|e| e.contains(bad)), "{bad}");
         }
         let late = Shard { index: 7, count: 8 }.split(scenes).unwrap_err().to_string();
         assert_eq!(late, "--shard: 7/8 has no scene: there are 5");

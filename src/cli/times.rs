@@ -3,6 +3,7 @@
 use crate::engine::clock::Phase;
 use crate::engine::world::{Settings, StepCounts, World};
 use crate::lab::error::Error;
+use crate::lab::profile::waiting;
 use crate::lab::scenes::Scene;
 use crate::lab::study::interleave::time_in_turns;
 use crate::lab::study::sample::{Sample, median};
@@ -93,7 +94,7 @@ impl Times {
     /// Warnings about the quality of the times.
     pub fn note(&self) -> String {
         let mut text = String::new();
-        if self.sample.waited > 0.01 {
+        if self.sample.waited >= waiting::BUSY {
             text += &format!(
                 "the timed thread waited for a processor {:.0} % of the time; waiting is not counted\n",
                 100.0 * self.sample.waited

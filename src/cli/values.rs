@@ -11,7 +11,7 @@ use crate::lab::error::Error;
 use crate::lab::overrides::{self, Override};
 use crate::lab::scenes::CATALOG;
 use crate::lab::study::{self, DEFAULT_SCENES, DEFAULT_SOLVERS, budget, default_solvers};
-use crate::lab::units::quantity;
+use crate::lab::units::{self, quantity};
 use clap::Args;
 use clap::builder::{NonEmptyStringValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 
@@ -26,6 +26,7 @@ pub enum Choice {
 
 /// `--solvers`
 #[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Solver and setting")]
 pub struct Solvers {
     /// Solvers to run
     #[arg(long, value_delimiter = ',', value_name = "SOLVER,…", value_parser = choice(), help = solvers_help())]
@@ -121,12 +122,14 @@ pub fn lanes() -> impl TypedValueParser<Value = LaneWidth> {
 
 /// The parser of constraint orders.
 pub fn order() -> impl TypedValueParser<Value = Order> {
+    // The names in files of results are accepted as well.
     let names = Order::ALL.map(|order| match order {
-        Order::Colored => PossibleValue::new("colored").alias("coloured"),
-        order => PossibleValue::new(order.name()),
+        Order::Colored => PossibleValue::new(units::order(order)).aliases(["colored", "coloured"]),
+        order => PossibleValue::new(units::order(order)).alias(order.name()),
     });
     PossibleValuesParser::new(names).map(|name| {
-        Order::ALL.into_iter().find(|order| order.name() == name.as_str()).unwrap_or(Order::Colored)
+        let is_it = |order: &Order| [order.name(), units::order(*order)].contains(&name.as_str());
+        Order::ALL.into_iter().find(is_it).unwrap_or(Order::Colored)
     })
 }
 
@@ -144,6 +147,7 @@ pub fn impacts() -> impl TypedValueParser<Value = Impacts> {
 
 /// `--impacts` of commands that take one treatment.
 #[derive(Args, Clone, Copy, Debug, Default)]
+#[command(next_help_heading = "Solver and setting")]
 pub struct ImpactArgs {
     /// Impact law: own is the solver's, waves solves impacts in waves before the step, none turns bouncing off
     #[arg(long, default_value = "own", value_name = "TREATMENT", value_parser = impacts())]
@@ -152,6 +156,7 @@ pub struct ImpactArgs {
 
 /// `--frozen` of commands that take one choice.
 #[derive(Args, Clone, Copy, Debug, Default)]
+#[command(next_help_heading = "Solver and setting")]
 pub struct FrozenArgs {
     /// Contacts that keep their normal and lever arms while bodies hardly move: own is the solver's choice, off is
     /// never, DISTANCE,TURN within such a motion (1mm,0.01: meters and radians), and DISTANCE,TURN,loaded only where
@@ -185,6 +190,7 @@ pub(super) fn frozen(text: &str) -> Result<Freezing, Error> {
 
 /// `--without` of commands that run a solver.
 #[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Solver and setting")]
 pub struct WithoutArgs {
     /// Mechanisms of the solver to leave out (`simpulse verify --without all` shows what each is for)
     #[arg(long, value_delimiter = ',', value_name = "NAME,…", value_parser = NonEmptyStringValueParser::new())]
@@ -211,6 +217,7 @@ pub fn widths(given: &[LaneWidth], own: Vec<LaneWidth>) -> Vec<LaneWidth> {
 
 /// The budget and the parameters of a setting.
 #[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Solver and setting")]
 pub struct BudgetArgs {
     /// Substeps [default: the solver's]
     #[arg(long, value_name = "N")]
@@ -231,6 +238,7 @@ pub struct BudgetArgs {
 
 /// The solver, its budget and its parameters, for commands that run one setting.
 #[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Solver and setting")]
 pub struct SettingArgs {
     /// Solver
     #[arg(long, default_value = DEFAULT, value_name = "SOLVER", value_parser = solver())]
@@ -300,6 +308,7 @@ impl SettingArgs {
 
 /// `--lanes` of commands that run at one width.
 #[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Solver and setting")]
 pub struct LaneArgs {
     /// Lanes per instruction [default: the widest that this build has instructions for; wider ones
     /// are emulated]

@@ -50,7 +50,7 @@ Examples:
   simpulse verify --random driven:17 --keep failed/        one scene again, and its minimized file")]
 pub struct VerifyArgs {
     /// Cases (B4.heavy) or families of cases (B4) [default: all]
-    #[arg(long, value_delimiter = ',', value_name = "ID,…", value_parser = NonEmptyStringValueParser::new(), conflicts_with = random::OPTIONS)]
+    #[arg(help_heading = "Cases", long, value_delimiter = ',', value_name = "ID,…", value_parser = NonEmptyStringValueParser::new(), conflicts_with = random::OPTIONS)]
     pub cases: Vec<String>,
     /// Solvers
     #[command(flatten)]
@@ -62,7 +62,7 @@ pub struct VerifyArgs {
     #[command(flatten)]
     pub without: WithoutArgs,
     /// Continuous collision: stop fast bodies at the surfaces that they would pass through [default: the solver's]
-    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    #[arg(help_heading = "Solver and setting", long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pub continuous: Option<bool>,
     /// Budget and parameters
     #[command(flatten)]
@@ -71,10 +71,10 @@ pub struct VerifyArgs {
     #[command(flatten)]
     pub frozen: FrozenArgs,
     /// Print JSON instead of text: everything that was measured
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     pub json: bool,
     /// List the cases with their tolerances and what is required of the default solver, without running them
-    #[arg(long, conflicts_with_all = NOT_LISTED)]
+    #[arg(help_heading = "Cases", long, conflicts_with_all = NOT_LISTED)]
     pub list: bool,
     /// Threads; the results do not depend on them [default: 2; all cores for random scenes, 1 with --pace]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]

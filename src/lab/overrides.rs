@@ -70,7 +70,7 @@ pub fn values(variant: &Variant, overrides: &[Override]) -> Result<Parameters, E
 pub fn brief(variant: &Variant, values: &Parameters) -> String {
     let changed = variant.parameters.iter().zip(values).filter(|(p, value)| p.default != **value);
     let texts = changed.map(|(p, value)| format!("{} {value} {}", p.name, p.unit).trim_end().to_string());
-    texts.collect::<Vec<_>>().join(" ")
+    texts.collect::<Vec<_>>().join(", ")
 }
 
 /// Differences from the default values, in the format of [`of_words`].

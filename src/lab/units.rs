@@ -1,6 +1,7 @@
 //! Formatting of numbers with three digits and an SI prefix, and parsing of numbers with units.
 
 use crate::engine::lanes::native_width;
+use crate::engine::world::Order;
 use crate::lab::error::Error;
 
 /// `value` in a unit with an SI prefix: `1.23 mm`, `45.6 µm`, `0 m`.
@@ -33,6 +34,21 @@ pub fn si_short(value: f64, unit: &str) -> String {
 /// A relative number: `2.4e-7`, `0`.
 pub fn ratio(value: f64) -> String {
     if value == 0.0 { "0".to_string() } else { format!("{value:.1e}") }
+}
+
+/// A fraction as a percentage with two digits: `35 %`, `0.35 %`, `0 %`.
+pub fn percent(fraction: f64) -> String {
+    let value = 100.0 * fraction;
+    match value.abs() {
+        0.0 => "0 %".to_string(),
+        size if size < 1e-3 || !size.is_finite() => format!("{value:.0e} %"),
+        size => {
+            let decimals = (1 - size.log10().floor() as i32).max(0) as usize;
+            let text = format!("{value:.decimals$}");
+            let short = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+            format!("{short} %")
+        }
+    }
 }
 
 /// A number with three digits: `1.23`, `12.3`, `1234`.
@@ -83,6 +99,24 @@ pub fn bodies(number: usize) -> String {
 pub fn lanes(lanes: usize) -> String {
     let emulated = if is_emulated(lanes) { ", emulated" } else { "" };
     count(lanes, "lane") + emulated
+}
+
+/// An order of constraints: `file`, in which contacts are solved one after the other as they are found; `parallel`,
+/// color by color, so that lanes are filled; `reversed`; `shuffled`. The names on the command line.
+pub fn order(order: Order) -> &'static str {
+    match order {
+        Order::Natural => "file",
+        Order::Colored => "parallel",
+        other => other.name(),
+    }
+}
+
+/// The lanes of a setting or, if it is serial, its order: `8 lanes`, `file order`.
+pub fn lanes_or_order(order: Order, width: usize) -> String {
+    match order {
+        Order::Colored => lanes(width),
+        serial => format!("{} order", self::order(serial)),
+    }
 }
 
 /// Whether lanes of this width are wider than this build has instructions for.

@@ -108,7 +108,7 @@ fn the_program_prints_evidence_and_writes_it() {
     let out = text(&found.stdout);
     assert_eq!(found.status.code(), Some(0), "{}", text(&found.stderr));
     for part in [
-        "limits on stack:3: penetration ≤ 5 mm, stands for a minute, rest speed ≤ 5 mm/s, time ≤ 1 s",
+        "limits on stack:3: overlap ≤ 5 mm, stands for a minute, rest speed ≤ 5 mm/s, time ≤ 1 s",
         "The cheapest setting that is good enough",
         "slower",
         "verdict",
@@ -132,7 +132,7 @@ fn the_program_prints_evidence_and_writes_it() {
     let out = text(&none.stdout);
     assert_eq!(none.status.code(), Some(1), "{}", text(&none.stderr));
     assert!(
-        out.contains("none is good enough; nearest is pgs") && out.contains("× tolerance of penetration"),
+        out.contains("nearest is pgs") && out.contains("× tolerance of overlap"),
         "{out}"
     );
     let none = json(limits);

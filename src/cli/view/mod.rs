@@ -42,28 +42,28 @@ pub struct ViewArgs {
     pub scene: String,
     /// Solvers of the panes, at most four, each with settings of its own:
     /// SOLVER[:NAME=VALUE…] with substeps, velocity, relax, position (sweeps), frozen, impacts or a parameter
-    #[arg(long, value_name = "SOLVER,…", value_delimiter = ',', value_parser = setting::pane(), conflicts_with = "solver")]
+    #[arg(help_heading = "Solver and setting", long, value_name = "SOLVER,…", value_delimiter = ',', value_parser = setting::pane(), conflicts_with = "solver")]
     pub solvers: Vec<PaneArg>,
     /// Settings of all panes
     #[command(flatten)]
     pub setting: SettingArgs,
     /// Random seed of scenes that have one
-    #[arg(long)]
+    #[arg(help_heading = "Scene and time", long)]
     pub seed: Option<u64>,
     /// Step in seconds [default: that of the scene]
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(help_heading = "Scene and time", long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub dt: Option<f64>,
     /// Give random pushes, as a player would; the seed decides which and when
-    #[arg(long, value_name = "SEED")]
+    #[arg(help_heading = "Scene and time", long, value_name = "SEED")]
     pub poke: Option<u64>,
     /// Pause after this many steps
-    #[arg(long, value_name = "N")]
+    #[arg(help_heading = "Scene and time", long, value_name = "N")]
     pub steps: Option<u64>,
     /// Port on 127.0.0.1 [default: a free one]
-    #[arg(long, value_name = "PORT", default_value_t = 0, hide_default_value = true)]
+    #[arg(help_heading = "Page", long, value_name = "PORT", default_value_t = 0, hide_default_value = true)]
     pub port: u16,
     /// End when no page has been open for this long
-    #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(help_heading = "Page", long, value_name = "SECONDS", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
     pub patience: u32,
 }
 

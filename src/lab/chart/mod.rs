@@ -5,6 +5,7 @@
 //! page. Axes are drawn here instead of by the library's chart builder, so that a chart of any range has readable ticks
 //! within tight limits.
 
+pub mod figure;
 pub mod scale;
 pub mod style;
 
@@ -338,9 +339,12 @@ impl PlotFrame<'_> {
         for (i, line) in wrapped(&x.name, most).iter().enumerate() {
             write(area, line, ((left + right) / 2, bottom + 27 + 13 * i as i32), NAME, HPos::Center)?;
         }
-        let font = ("sans-serif", NAME).into_font().transform(FontTransform::Rotate270);
-        let style = font.color(&INK).pos(Pos::new(HPos::Center, VPos::Center));
-        area.draw(&Text::new(y.name.clone(), (10, (top + bottom) / 2), style))?;
+        let most = ((bottom - top) / 6).max(10) as usize;
+        for (i, line) in wrapped(&y.name, most).into_iter().enumerate() {
+            let font = ("sans-serif", NAME).into_font().transform(FontTransform::Rotate270);
+            let style = font.color(&INK).pos(Pos::new(HPos::Center, VPos::Center));
+            area.draw(&Text::new(line, (10 + 13 * i as i32, (top + bottom) / 2), style))?;
+        }
         Ok(())
     }
 
@@ -459,9 +463,32 @@ pub fn legend<'a>(names: impl IntoIterator<Item = (&'a str, Style)>) -> String {
     format!("<p class=\"legend\">{}</p>\n", names.into_iter().map(entry).collect::<String>())
 }
 
+/// Height of a row of a legend (pixels).
+const LINE: i32 = 24;
+
+/// Rows of markers with names below `y`, within a width, as SVG; and where they end (pixels).
+fn legend_rows(names: &[(&str, Style)], width: i32, y: i32) -> (String, i32) {
+    let (mut text, mut x, mut y) = (String::new(), 12, y + LINE - 8);
+    for (name, style) in names {
+        let entry = 30 + 7 * name.chars().count() as i32;
+        if x + entry > width && x > 12 {
+            (x, y) = (12, y + LINE - 6);
+        }
+        let path = style.marker.path([f64::from(x + 6), f64::from(y - 5)], 5.0);
+        text += &format!(
+            "<path d=\"{path}\" fill=\"{}\"/><text x=\"{}\" y=\"{y}\" font-size=\"{}\" fill=\"var(--ink)\">{}</text>\n",
+            style.color,
+            x + 16,
+            f64::from(TICK) / 1.24,
+            escaped(name)
+        );
+        x += entry;
+    }
+    (text, if names.is_empty() { y + 8 - LINE } else { y + 8 })
+}
+
 /// Charts as an SVG file: a title, a legend, and rows of charts with a heading each.
 pub fn file(title: &str, names: &[(&str, Style)], rows: &[(String, Vec<Chart>)]) -> String {
-    const LINE: i32 = 24;
     let row_size = |charts: &[Chart]| {
         let width: i32 = charts.iter().map(|c| c.size[0]).sum();
         [width, charts.iter().map(|c| c.size[1]).max().unwrap_or(0)]
@@ -473,21 +500,8 @@ pub fn file(title: &str, names: &[(&str, Style)], rows: &[(String, Vec<Chart>)])
             escaped(text)
         )
     };
-    let (mut text, mut x, mut y) = (heading(20, 16, title), 12, 2 * LINE - 4);
-    for (name, style) in names {
-        let entry = 30 + 8 * name.chars().count() as i32;
-        if x + entry > width && x > 12 {
-            (x, y) = (12, y + LINE);
-        }
-        let path = style.marker.path([f64::from(x + 6), f64::from(y - 5)], 5.0);
-        text += &format!(
-            "<path d=\"{path}\" fill=\"{}\"/><text x=\"{}\" y=\"{y}\" font-size=\"13\" fill=\"var(--ink)\">{}</text>\n",
-            style.color,
-            x + 16,
-            escaped(name)
-        );
-        x += entry;
-    }
+    let (legend, mut y) = legend_rows(names, width, LINE);
+    let mut text = heading(20, 16, title) + &legend;
     for (name, charts) in rows {
         y += LINE;
         text += &heading(y, 15, name);

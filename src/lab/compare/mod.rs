@@ -367,7 +367,11 @@ fn key(r: &Record) -> impl PartialEq {
 fn pair(one: &Record, other: &Record) -> SettingPair {
     let errors = ErrorAxis::ALL.into_iter().filter_map(|axis| {
         let values = [axis.of(one)?, axis.of(other)?];
-        let unit = axis.unit(std::slice::from_ref(one));
+        // Values are fractions.
+        let unit = match axis.unit(std::slice::from_ref(one)) {
+            "%" => "1",
+            unit => unit,
+        };
         let tolerance = axis.tolerance(&one.tolerances).map_or(0.0, |t| t.value);
         Some(ErrorChange { error: axis.word(), unit, values, negligible: NEGLIGIBLE * tolerance })
     });

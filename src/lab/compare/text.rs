@@ -1,9 +1,9 @@
 //! A comparison as text.
 
 use super::{Comparison, SettingPair, Verdict};
-use crate::engine::world::Order;
 use crate::lab::report::table::{finish, table};
-use crate::lab::report::units::{digits, lanes, ratio, si};
+use crate::lab::report::units::{digits, lanes_or_order, percent, ratio, si};
+use crate::lab::study::curve::ErrorAxis;
 
 /// Rows of each list, unless `--all` is given.
 const ROWS: usize = 10;
@@ -107,10 +107,7 @@ fn section(title: &str, mut lines: Vec<ChangeLine>, all: bool) -> String {
 }
 
 fn cells(pair: &SettingPair, what: &str, before: String, after: String) -> [String; 7] {
-    let width = match pair.order {
-        Order::Colored => lanes(pair.lanes),
-        order => order.name().to_string(),
-    };
+    let width = lanes_or_order(pair.order, pair.lanes);
     [pair.scene.clone(), pair.solver.into(), pair.budget.clone(), width, what.into(), before, after]
 }
 
@@ -126,7 +123,11 @@ fn holding(pair: &SettingPair) -> Option<ChangeLine> {
 fn errors(pair: &SettingPair, threshold: f64) -> Vec<ChangeLine> {
     // All widths of a setting have the same errors, so one of them is enough.
     let line = |e: &super::ErrorChange| {
-        let [before, after] = e.values.map(|v| if e.unit.is_empty() { ratio(v) } else { si(v, e.unit) });
+        let [before, after] = e.values.map(|v| match (e.error == ErrorAxis::Law.word(), e.unit) {
+            (true, _) => percent(v),
+            (_, "") => ratio(v),
+            (_, unit) => si(v, unit),
+        });
         ChangeLine {
             cells: cells(pair, e.error, before, after),
             growth: e.growth(),

@@ -37,7 +37,7 @@ pub fn svg(report: &ConvergeReport, styles: Styles) -> String {
     let rows: Vec<(String, Vec<Chart>)> = laws(report).iter().map(row).collect();
     let names: Vec<(&str, Style)> = names.iter().map(|(label, style)| (label.as_str(), *style)).collect();
     let title = format!(
-        "{}: residual against work; solid: natural order, dashed: colored or shuffled",
+        "{}: force error against work; solid: file order, dashed: parallel or shuffled",
         report.problem
     );
     chart::file(&title, &names, &rows)
@@ -103,7 +103,7 @@ fn chart(report: &ConvergeReport, law: &LawRow, styles: Styles) -> Option<Chart>
         size: [520, 320],
         title: String::new(),
         x: Axis { name: "constraint sweeps".into(), scale: Scale::log(xs, "") },
-        y: Axis { name: "residual".into(), scale: y },
+        y: Axis { name: "force error".into(), scale: y },
         strip: FailStrip::None,
         good: [None; 2],
         series,

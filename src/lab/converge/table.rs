@@ -2,115 +2,183 @@
 
 use super::replay::{Sequence, Start};
 use super::warm::{OFF, WarmStartSource};
-use super::{ConvergeReport, CurvePoint, Reached, ReplayCurve, TOLERANCES};
+use super::{ConvergeReport, Reached, ReplayCurve, TOLERANCES};
 use crate::lab::error::Error;
 use crate::lab::reference::certify::Uniqueness;
-use crate::lab::units::{is_emulated, si};
-use comfy_table::{CellAlignment, Table, presets};
+use crate::lab::report::table::{finish, table};
+use crate::lab::units::{lanes, percent, si};
 use serde::Serialize;
 
-/// Shown for a tolerance that is not reached.
-const NEVER: &str = "—";
-/// Indices in [`TOLERANCES`] of the two tolerances in the answer.
+/// Shown for a force error that is not reached.
+const NEVER: &str = "never";
+/// Shown for what does not exist.
+const NONE: &str = "–";
+/// Indices in [`TOLERANCES`] of the two force errors in the table: 1 % and 0.01 %.
 const TOLD: [usize; 2] = [1, 3];
 /// Maximum number of rows of the table; the CSV has all.
 const MOST_ROWS: usize = 20;
 
-/// The answer in sentences: sweeps that each solver needs to 1e-2 and to 1e-4, cold and warm, next to the
-/// rate of Gauss–Seidel. Then a table of iterations to each tolerance.
+/// Which solver needs the fewest sweeps, a table of the sweeps of each, the problem, and what the table leaves out.
 pub fn text(report: &ConvergeReport) -> String {
     let joints =
         if report.joint_rows > 0 { format!(", {} rows of joints", report.joint_rows) } else { String::new() };
+    let rows = rows(report);
+    let shown = rows.len().min(MOST_ROWS);
+    let more = match rows.len() - shown {
+        0 => String::new(),
+        more => format!("{more} more rows in converge.csv and converge.json, which also have other orders.\n"),
+    };
     format!(
-        "{}: {} bodies, {} contact points{joints}; residuals in units of {:.4e} N·s\n{}\n{}\n{}\n{}",
+        "{}{}{more}\n{}: {} bodies, {} contact points{joints}; {}.\n\
+         Force error: how far impulses are from the contact law, at most, in % of {:.4e} N·s: the impulse of the heaviest \
+         body's weight, or of its change of velocity if that is larger. Sweeps in parallel order ({}); f64 methods in file \
+         order. Own law: that of soft contacts or of position feedback, where it differs. v error: distance of the \
+         velocities from the reference.\n{}{}",
+        answer(&rows),
+        table_of(&rows[..shown]),
         report.problem,
         report.bodies,
         report.contacts,
-        report.impulse_unit,
         reference_line(report),
-        answer(report),
+        report.impulse_unit,
+        lanes(report.lanes),
+        baseline(report),
         starts(report),
-        rows(report)
     )
 }
 
 fn reference_line(report: &ConvergeReport) -> String {
-    let Some(c) = &report.certificate else { return "Reference: none, so no velocity errors".into() };
+    let Some(c) = &report.certificate else { return "no reference, so no velocity errors".into() };
     let unique = match c.uniqueness {
         Uniqueness::Proven => "unique (no friction)",
         Uniqueness::Agreed => "agreed on by two methods",
-        Uniqueness::Multiple => "NOT unique: use the residual instead of their error",
+        Uniqueness::Multiple => "NOT unique: compare force errors instead of velocities",
         Uniqueness::Unknown => "found by one method only",
     };
-    format!("Reference: {}, natural-map residual {:.1e}, velocities {unique}", c.method, c.natural_map)
+    format!("reference by {} with a force error of {}, velocities {unique}", c.method, percent(c.natural_map))
 }
 
-/// Whole schedules in colored order.
-fn answer(report: &ConvergeReport) -> String {
-    let is_whole = |c: &&ReplayCurve| c.arithmetic == "f32" && c.order == Sequence::Colored && !c.is_part;
+/// A solver under a law.
+struct SolverRow<'a> {
+    name: String,
+    /// Whether it is code of the simulation, under the rigid law.
+    competes: bool,
+    /// The curves from the previous impulses and from zero; their results under the law.
+    starts: [Option<(&'a ReplayCurve, &'a Reached)>; 2],
+}
+
+impl SolverRow<'_> {
+    /// Sweeps to [`TOLERANCES`]`[at]` from a start; `None` if that start did not run, `Some(None)` if never.
+    fn sweeps(&self, at: usize, start: usize) -> Option<Option<usize>> {
+        self.starts[start].map(|(curve, reached)| reached.first[at].map(|i| curve.points[i].sweeps))
+    }
+}
+
+/// The whole schedules in parallel order, and the f64 methods: those first that need the fewest sweeps.
+fn rows(report: &ConvergeReport) -> Vec<SolverRow<'_>> {
+    let order = |c: &ReplayCurve| {
+        if c.arithmetic == "f32" { Sequence::Colored } else { Sequence::Natural }
+    };
+    let is_whole = |c: &&ReplayCurve| !c.is_part && c.order == order(c);
     let whole: Vec<&ReplayCurve> = report.curves.iter().filter(is_whole).collect();
-    let emulated = if is_emulated(report.lanes) { ", emulated" } else { "" };
-    let mut text =
-        format!("In colored order ({} lanes{emulated}), against the rigid contact law:\n", report.lanes);
-    for (at, start) in TOLD.into_iter().flat_map(|at| [(at, Start::Cold), (at, Start::Warm)]) {
-        let own: Vec<_> =
-            whole.iter().filter(|c| c.start == start).map(|c| (&c.solver, to(c, &c.rigid, at))).collect();
-        if own.is_empty() {
-            continue;
-        }
-        let mut reached: Vec<_> = own.iter().filter_map(|(name, n)| n.map(|n| (n, name))).collect();
-        reached.sort();
-        let each: Vec<String> = reached.iter().map(|(n, name)| format!("{name} {n}")).collect();
-        let never: Vec<&str> =
-            own.iter().filter(|(_, n)| n.is_none()).map(|(name, _)| name.as_str()).collect();
-        text += &format!("Sweeps to {:.0e}, {start}: ", TOLERANCES[at]);
-        text += &match (each.is_empty(), never.is_empty()) {
-            (true, _) => "no solver reaches it".into(),
-            (false, true) => each.join(", "),
-            (false, false) => format!("{}; never {}", each.join(", "), never.join(", ")),
-        };
-        text += ".\n";
-    }
-    let changed: Vec<String> = (whole.iter().filter(|c| !c.own_is_rigid && c.start == Start::Cold))
-        .map(|c| {
-            let sweeps = TOLD.map(|at| {
-                let n = to(c, &c.own, at).map_or("none".into(), |n| n.to_string());
-                format!("{n} to {:.0e}", TOLERANCES[at])
+    let mut rows: Vec<SolverRow> = Vec::new();
+    for curve in &whole {
+        let is_f32 = curve.arithmetic == "f32";
+        for own in [false, true].into_iter().take(if curve.own_is_rigid { 1 } else { 2 }) {
+            let suffix = match (is_f32, own) {
+                (false, _) => " (f64)",
+                (true, true) => ", own law",
+                (true, false) => "",
+            };
+            let name = format!("{}{suffix}", curve.solver);
+            if rows.iter().any(|row| row.name == name) {
+                continue;
+            }
+            let starts = [Start::Warm, Start::Cold].map(|start| {
+                let mut same = whole.iter().filter(|c| c.solver == curve.solver && c.arithmetic == curve.arithmetic);
+                let found = same.find(|c| c.start == start)?;
+                Some((*found, if own { &found.own } else { &found.rigid }))
             });
-            format!("{} {}", c.solver, sweeps.join(", "))
-        })
-        .collect();
-    if !changed.is_empty() {
-        let list = changed.join("; ");
-        text += &format!("Sweeps to a solver's own law, if it differs from the rigid law, cold: {list}.\n");
+            rows.push(SolverRow { name, competes: is_f32 && !own, starts });
+        }
     }
-    text + &baseline(report, &whole)
+    let key = |row: &SolverRow| {
+        let needs = |at, start| row.sweeps(at, start).flatten().unwrap_or(usize::MAX);
+        (!row.competes, needs(TOLD[1], 0), needs(TOLD[1], 1), needs(TOLD[0], 0), needs(TOLD[0], 1))
+    };
+    rows.sort_by_key(key);
+    rows
 }
 
-/// Sweeps to a tolerance.
-fn to(curve: &ReplayCurve, law: &Reached, at: usize) -> Option<usize> {
-    law.first[at].map(|i| curve.points[i].sweeps)
+/// Who needs the fewest sweeps.
+fn answer(rows: &[SolverRow]) -> String {
+    let fewest = |at: usize, start: usize| {
+        let own = rows.iter().filter(|row| row.competes);
+        let needs = own.filter_map(|row| Some((row.sweeps(at, start)??, row.name.as_str())));
+        let least = needs.clone().map(|(sweeps, _)| sweeps).min()?;
+        let names: Vec<&str> = needs.filter(|(sweeps, _)| *sweeps == least).map(|(_, name)| name).collect();
+        Some(format!("{least} ({})", names.join(", ")))
+    };
+    let mut text = String::new();
+    for at in TOLD {
+        let tolerance = percent(TOLERANCES[at]);
+        let from = [("from the previous impulses", 0), ("from zero", 1)].into_iter();
+        let found: Vec<String> =
+            from.filter_map(|(words, start)| Some(format!("{} {words}", fewest(at, start)?))).collect();
+        text += &match found.is_empty() {
+            true => format!("No solver reaches a force error of {tolerance}.\n"),
+            false => format!("Fewest sweeps to a force error of {tolerance}: {}.\n", found.join(", ")),
+        };
+    }
+    text + "\n"
 }
 
-/// Measured rates, compared with that of Gauss–Seidel.
-fn baseline(report: &ConvergeReport, curves: &[&ReplayCurve]) -> String {
+fn table_of(rows: &[SolverRow]) -> String {
+    let [rough, fine] = TOLD.map(|at| percent(TOLERANCES[at]));
+    let head = [
+        "sweeps to".to_string(),
+        format!("{rough}\nwarm"),
+        "\nfrom zero".to_string(),
+        format!("{fine}\nwarm"),
+        "\nfrom zero".to_string(),
+        "factor per\niteration".to_string(),
+        "smallest\nforce error".to_string(),
+        "v error".to_string(),
+        "time of an\niteration".to_string(),
+    ];
+    let mut cells = table(&head.each_ref().map(String::as_str));
+    for row in rows {
+        let mut line = vec![row.name.clone()];
+        for (at, start) in TOLD.into_iter().flat_map(|at| [(at, 0), (at, 1)]) {
+            line.push(match row.sweeps(at, start) {
+                None => NONE.into(),
+                Some(None) => NEVER.into(),
+                Some(Some(sweeps)) => sweeps.to_string(),
+            });
+        }
+        let last = row.starts[1].or(row.starts[0]);
+        let of = |value: Option<String>| value.unwrap_or(NONE.into());
+        line.push(of(last.and_then(|(_, reached)| reached.rate).map(|rate| format!("{rate:.4}"))));
+        line.push(of(last.map(|(_, reached)| percent(reached.smallest))));
+        let error = last.and_then(|(curve, _)| curve.points.last()?.velocity_error);
+        line.push(of(error.map(percent)));
+        line.push(of(last.and_then(|(curve, _)| curve.iteration).map(|time| si(1e-9 * time.median_ns, "s"))));
+        cells.add_row(line);
+    }
+    finish(cells, 1)
+}
+
+/// The rate of Gauss–Seidel.
+fn baseline(report: &ConvergeReport) -> String {
     let Some(rate) = report.gauss_seidel_rate else {
         return "Gauss–Seidel in f64 has no rate here: it never converges, or at once.\n".into();
     };
     let sweeps = |tolerance: f64| (tolerance.ln() / rate.ln()).ceil();
-    let mut text = format!(
-        "Gauss–Seidel in f64, in the problem's order and from zero, has an asymptotic rate of {rate:.4} per sweep"
-    );
-    if rate < 1.0 {
-        text += &format!(", {:.0} sweeps to 1e-2 and {:.0} to 1e-4", sweeps(1e-2), sweeps(1e-4));
-    }
-    let is_rigid = |c: &&&ReplayCurve| c.start == Start::Cold && c.own_is_rigid;
-    let measured =
-        curves.iter().filter(is_rigid).filter_map(|c| Some(format!("{} {:.4}", c.solver, c.rigid.rate?)));
-    match measured.collect::<Vec<_>>().as_slice() {
-        [] => text + ".\n",
-        list => format!("{text}; measured per iteration: {}.\n", list.join(", ")),
-    }
+    let counts = match rate < 0.99995 {
+        true => format!(": {:.0} sweeps to 1 %, {:.0} to 0.01 %", sweeps(1e-2), sweeps(1e-4)),
+        false => String::new(),
+    };
+    format!("Gauss–Seidel in f64, in file order and from zero, ends at a factor of {rate:.4} per sweep{counts}.\n")
 }
 
 /// Where warm starts come from, and which curves are missing.
@@ -141,63 +209,6 @@ fn starts(report: &ConvergeReport) -> String {
         );
     }
     text
-}
-
-/// One row per curve, or two if the solver's own law differs from the rigid one. If these are too many, only
-/// whole schedules in colored order, and of those the first to 1e-4.
-fn rows(report: &ConvergeReport) -> String {
-    let laws = |c: &'_ &ReplayCurve| if c.own_is_rigid { 1 } else { 2 };
-    let mut shown: Vec<&ReplayCurve> = report.curves.iter().collect();
-    let count = |shown: &[&ReplayCurve]| shown.iter().map(laws).sum::<usize>();
-    let all = count(&shown);
-    if all > MOST_ROWS {
-        shown.retain(|c| !c.is_part && (c.order == Sequence::Colored || c.arithmetic == "f64"));
-        shown.retain(|c| !matches!(c.order, Sequence::Shuffled(_)));
-        if count(&shown) > MOST_ROWS {
-            shown.sort_by_key(|c| to(c, &c.rigid, 3).unwrap_or(usize::MAX));
-        }
-        while count(&shown) > MOST_ROWS {
-            shown.pop();
-        }
-    }
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN);
-    let mut header: Vec<String> = ["solver", "order", "start", "law"].map(String::from).to_vec();
-    header.extend(TOLERANCES.map(|t| format!("{t:.0e}")));
-    header.extend(["rate", "smallest", "v error", "iteration"].map(String::from));
-    table.set_header(header);
-    for curve in &shown {
-        for (law, reached) in [("rigid", &curve.rigid), ("own", &curve.own)].into_iter().take(laws(curve)) {
-            let name = if curve.arithmetic == "f32" { "" } else { " (f64)" };
-            let mut row = vec![format!("{}{name}", curve.solver)];
-            row.extend([curve.order.to_string(), curve.start.to_string(), law.into()]);
-            let number = |value: Option<String>| value.unwrap_or(NEVER.into());
-            row.extend(reached.first.map(|i| number(i.map(|i| iterations(&curve.points[i])))));
-            row.push(number(reached.rate.map(|r| format!("{r:.4}"))));
-            row.push(format!("{:.1e}", reached.smallest));
-            let error = curve.points.last().and_then(|p| p.velocity_error);
-            row.push(number(error.map(|e| format!("{e:.1e}"))));
-            row.push(number(curve.iteration.map(|time| si(1e-9 * time.median_ns, "s"))));
-            table.add_row(row);
-        }
-    }
-    for column in table.column_iter_mut().skip(4) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    let more = match all - count(&shown) {
-        0 => String::new(),
-        more => format!("{more} more rows: converge.csv and converge.json have all curves.\n"),
-    };
-    format!(
-        "Iterations to a residual (iterations/sweeps where they differ), by law; time of an iteration:\n{table}\n{more}"
-    )
-}
-
-fn iterations(point: &CurvePoint) -> String {
-    match point.iterations as usize == point.sweeps {
-        true => point.sweeps.to_string(),
-        false => format!("{}/{}", point.iterations, point.sweeps),
-    }
 }
 
 /// A point of a curve, as a line of CSV.

@@ -50,7 +50,7 @@ pub fn slope(values: &[f64], dt: f64) -> Option<Slope> {
 
 /// The 97.5 % quantile of Student's distribution with ν degrees of freedom: exact for ν ≤ 4, otherwise by the
 /// Cornish–Fisher expansion in 1/ν, whose error is below 0.3 % at ν = 5.
-fn student_975(nu: usize) -> f64 {
+pub(in crate::lab) fn student_975(nu: usize) -> f64 {
     const FEW: [f64; 4] = [12.7062, 4.3027, 3.1824, 2.7764];
     if let Some(&known) = nu.checked_sub(1).and_then(|i| FEW.get(i)) {
         return known;

@@ -46,27 +46,27 @@ pub const METRICS: &[Metric] = &[
     always("flight_depth_max_m", "m", "largest overlap of bodies when their contact was found", |o| {
         o.flight_max
     }),
-    always("held_depth_p99_m", "m", "99th percentile of penetration beyond the depth found first", |o| {
+    always("held_depth_p99_m", "m", "overlap that the solver left, 99th percentile: beyond the depth at which the contact was found", |o| {
         o.held.p99()
     }),
-    always("rest_depth_max_m", "m", "largest penetration of the last second", |o| {
+    always("rest_depth_max_m", "m", "largest overlap of the last second", |o| {
         o.depths.largest().penetration
     }),
-    always("penetration_max_m", "m", "largest penetration after a step, pairs searched again", |o| {
+    always("penetration_max_m", "m", "largest overlap after a step, pairs searched again", |o| {
         o.penetration.max()
     }),
-    always("penetration_mean_m", "m", "mean penetration of contact points; open ones count as 0", |o| {
+    always("penetration_mean_m", "m", "mean overlap of contact points; open ones count as 0", |o| {
         o.penetration.mean()
     }),
     always("penetration_rms_m", "m", "root mean square of the same", |o| o.penetration.rms()),
     always("penetration_p99_m", "m", "99th percentile of the same", |o| o.penetration.p99()),
-    always("penetration_relative", "1", "largest penetration ÷ half the thinnest dynamic shape", |o| {
+    always("penetration_relative", "1", "largest overlap ÷ half the thinnest dynamic shape", |o| {
         ratio(o.penetration.max(), o.half_extent)
     }),
     sometimes(
         "penetration_excess_m",
         "m",
-        "largest penetration of the last second beyond the static deflection of the soft contacts",
+        "largest overlap of the last second beyond the static deflection of the soft contacts",
         |o| Some(o.soft_depths()?.excess),
     ),
     sometimes(
@@ -78,7 +78,7 @@ pub const METRICS: &[Metric] = &[
     always(
         "residual_rms_lighter_weights",
         "1",
-        "residual of the rigid contact law, rms, each point over weight of its lighter body × step, without the first step",
+        "force error: distance of contact impulses from the contact law, rms, each point over weight of its lighter body × step, without the first step",
         |o| match o.lighter.count {
             0 => ratio(o.residual_rms(), o.body_unit()),
             _ => o.lighter.rms(),
@@ -111,7 +111,7 @@ pub const METRICS: &[Metric] = &[
     sometimes(
         "own_residual_rms",
         "1",
-        "residual of the solver's own law, rms, over weight × substep",
+        "force error under the solver's own law, rms, over weight × substep",
         |o| o.own(Sum::rms),
     ),
     sometimes("own_residual_max", "1", "the same, largest", |o| o.own(Sum::max)),
@@ -128,7 +128,7 @@ pub const METRICS: &[Metric] = &[
     sometimes(
         "joint_residual_rms_lighter_weights",
         "1",
-        "residual of the law of joints, rms, in the weight of the lighter body × step",
+        "force error of joints, rms, in the weight of the lighter body × step",
         |o| o.joints.residual(Sum::rms),
     ),
     sometimes("joint_residual_max_lighter_weights", "1", "the same, largest", |o| {
@@ -181,7 +181,7 @@ pub const METRICS: &[Metric] = &[
         "largest energy gain in one step that no impulse explains, relative",
         |o| o.balance.close().energy_unexplained,
     ),
-    always("rest_speed_m_s", "m/s", "residual speed √(2 E_kin/M), rms over the last second", |o| {
+    always("rest_speed_m_s", "m/s", "speed that remains, √(2 E_kin/M), rms over the last second", |o| {
         o.rest.speed()
     }),
     always("creep_m_s", "m/s", "fastest creep of a body on another over the last second", |o| {

@@ -67,7 +67,7 @@ impl PhaseReport {
     pub fn limit(&self, multiply_adds: Option<f64>) -> Option<&'static str> {
         match self.reached(multiply_adds) {
             [None, _] => None,
-            [Some(memory), None] if memory < REACHED => Some("latency- or compute-bound"),
+            [Some(memory), None] if memory < REACHED => Some("not bandwidth"),
             [Some(memory), arithmetic] => match arithmetic.unwrap_or(0.0) {
                 arithmetic if memory.max(arithmetic) < REACHED => Some("latency-bound"),
                 arithmetic if arithmetic > memory => Some("compute-bound"),
@@ -248,6 +248,6 @@ mod tests {
         assert_eq!(limit(230.0, Some(10.0)), Some("latency-bound"));
         // 400 operations take 200 ns.
         assert_eq!(limit(250.0, Some(400.0)), Some("compute-bound"));
-        assert_eq!(limit(900.0, None), Some("latency- or compute-bound"));
+        assert_eq!(limit(900.0, None), Some("not bandwidth"));
     }
 }

@@ -8,7 +8,8 @@ const LEGEND: &str = "\
 passes: per step.  µs/pass: median over steps, beside it mean and longest, ± median deviation.  working set:
 bytes that a pass touches.  GB/s: bytes that the source names over time; % of peak: of reading a buffer as large
 as the working set, or of multiply-adds at this width, measured in the same run.  limit: bandwidth- or
-compute-bound from half of a ceiling on, else latency-bound (dependent operations, gathers, branches).
+compute-bound from half of a ceiling on; not bandwidth: below half of it, operations are not counted; latency-bound:
+below half of both (dependent operations, gathers, branches).
 flop: of contacts.  – not known for this phase or solver, or not measured.
 ";
 

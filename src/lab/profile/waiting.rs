@@ -10,10 +10,13 @@ pub fn share(before: Option<Duration>, elapsed: Duration) -> Option<f64> {
     Some(waiting.as_secs_f64() / elapsed.as_secs_f64().max(1e-9))
 }
 
+/// Waiting below this fraction of the time is not mentioned (1).
+pub const BUSY: f64 = 0.05;
+
 /// A line for reports; empty if there is nothing to report.
 pub fn note(share: Option<f64>) -> String {
     match share {
-        Some(share) if share >= 0.01 => format!(
+        Some(share) if share >= BUSY => format!(
             "this thread waited for a processor {:.0} % of the time: the machine is busy\n",
             100.0 * share
         ),
@@ -28,6 +31,6 @@ mod tests {
     #[test]
     fn waiting_is_said_where_there_is_some() {
         assert_eq!(share(None, Duration::from_secs(1)), None);
-        assert!(note(Some(0.5)).contains("50 %") && note(Some(0.001)).is_empty() && note(None).is_empty());
+        assert!(note(Some(0.5)).contains("50 %") && note(Some(0.049)).is_empty() && note(None).is_empty());
     }
 }

@@ -1,34 +1,38 @@
 //! The answer of a study on one page: which solver to use and when, the drawbacks, the best setting on each
 //! scene, which solvers fail, and what was left out.
 
-use super::by_scene::{self, verdict};
+use super::by_scene::verdict;
 use super::doc::{self, DocBlock, DocCell, DocTable, Tone};
 use super::environment::Environment;
-use super::units::{count as number, digits, is_emulated};
+use super::units::{count as number, digits, is_emulated, order as order_name};
 use crate::engine::solvers::DEFAULT;
 use crate::engine::world::Order;
-use crate::lab::scenes::CATALOG;
-use crate::lab::scenes::class::SceneClass;
+use crate::lab::profile::waiting::BUSY;
+use crate::lab::scenes::kind::SceneKind;
 use crate::lab::scenes::tolerance::Accuracy;
 use crate::lab::study::answer::{Answer, each_setting, fails_last, order};
-use crate::lab::study::compare::Ratio;
+use crate::lab::study::compare::{Ratio, TIE};
 use crate::lab::study::curve::{ErrorAxis, distinct, solvers_of};
-use crate::lab::study::ranking::{FirstPlaces, Ranking, Standing, ranking};
+use crate::lab::study::ranking::{Ranking, Standing, ranking};
 use crate::lab::study::{self, Record};
 
 const MOST_RANKED: usize = 8;
 const MOST_NOTES: usize = 7;
 
-/// Waiting beyond this fraction of the time causes a warning (1).
-const BUSY: f64 = 0.02;
+/// More scenes that are not in the catalog share a sentence.
+const MOST_OWN: usize = 3;
+
+/// A study of scenes of at least so many kinds says which kinds it lacks.
+const BROAD: usize = 3;
 
 /// Description of the columns of the answer.
 const LEGEND: &str = "\
-Good enough (plausible): the scene holds, stands for a minute if it has to rest, and its errors are within the tolerances \
-of the scene (`simpulse list SCENE`): pen., penetration (1 cm for bodies of 1 m); res., contact-law residual (10 % of the \
-lighter body's weight); ref., distance to the reference value; rest, speed at rest. tight: within 10 % of them; exact: \
-within 1 %. µs/step: mean over the run, its median, its longest step. next: the cheapest setting of another solver, and \
-how much slower it is; tie: too close to call.";
+Good enough: the scene holds, stands for a minute if it has to rest, and its errors are within the tolerances of the scene \
+(`simpulse list SCENE`). Overlap: what the solver left at 99 % of contact points, and the largest at rest (1 cm for bodies of \
+1 m). Force error: how far contact impulses are from the contact law (no pull, no push across a gap, Coulomb friction), root \
+mean square, in % of the weight of the lighter body (10 %). Reference: distance to the known value. Rest: speed at rest. 10 × \
+and 100 × tighter: within 10 % and 1 % of the tolerances. A setting is substeps × sweeps in each. µs/step: mean over the run, \
+and its longest step. next: the cheapest setting of another solver, and how much slower it is; tie: too close to call.";
 
 /// The answer of a study as text, from its records alone; `steps` if runs were limited to that many steps.
 pub fn text(records: &[Record], environment: &Environment, steps: Option<u32>) -> String {
@@ -39,90 +43,126 @@ pub fn text(records: &[Record], environment: &Environment, steps: Option<u32>) -
 pub fn blocks(records: &[Record], environment: &Environment, steps: Option<u32>) -> Vec<DocBlock> {
     let scenes: Vec<Answer> = records.chunk_by(|a, b| a.scene == b.scene).filter_map(Answer::of).collect();
     let ranking = ranking(records);
-    let (cheapest, without) = cheapest(&scenes, records, "FILE.json");
+    let (cheapest, unsolved) = cheapest(&scenes, records, "FILE.json");
     let plain = |text: String| DocBlock::Text(Tone::Plain, text);
     vec![
         DocBlock::Text(Tone::Lead, recommendation(&ranking, scenes.len(), steps)),
+        DocBlock::Points(by_kind(records)),
         DocBlock::Text(Tone::Bad, warnings(records, steps)),
-        plain(head(records, environment, scenes.len())),
         DocBlock::Table(cheapest),
-        plain(without),
+        plain(unsolved),
         DocBlock::Table(DocTable { most: MOST_NOTES, ..fail_later(records) }),
         DocBlock::Table(accuracies(&scenes, records)),
         DocBlock::Table(standings(&ranking, scenes.len())),
         DocBlock::Text(Tone::Soft, LEGEND.to_string()),
+        DocBlock::Text(Tone::Soft, head(records, environment, scenes.len())),
     ]
 }
 
-/// The recommendation with its conditions, and the rank of the default solver.
+/// Mean speed of a solver relative to each scene's fastest, over those of `scenes` on which it is good enough.
+fn speed(standing: &Standing, scenes: usize) -> String {
+    format!("{:.0} %", 100.0 * standing.score * scenes as f64 / standing.good[0].max(1) as f64)
+}
+
+/// The solver that is good enough on most scenes; of several, the fastest.
+fn widest(ranking: &Ranking) -> Option<&Standing> {
+    let most = ranking.standings.iter().map(|s| s.good[0]).max().filter(|most| *most > 0)?;
+    // The standings are sorted by score.
+    ranking.standings.iter().find(|s| s.good[0] == most)
+}
+
+/// One solver for all scenes, and whether the default is another one.
 fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> String {
-    let standings = &ranking.standings;
-    let all: Vec<&Standing> = standings.iter().filter(|s| s.good[0] == scenes).collect();
-    let only = if let [only] = all[..] { Some(only) } else { None };
-    let speed = |s: &Standing| format!("{:.0} % of the speed of each scene's fastest", 100.0 * s.score);
-    let (mut text, usage) = match steps {
-        Some(n) => (format!("Not a recommendation: runs end after {n} steps.  "), "First is"),
-        None => (String::new(), "Use"),
+    let mut text =
+        steps.map_or(String::new(), |n| format!("Not a recommendation: runs end after {n} steps.  "));
+    let Some(first) = widest(ranking) else {
+        return text + "No setting is good enough on any scene.\n";
     };
-    text += &match (ranking.leader(), only) {
-        (Some(first), _) => format!(
-            "{usage} {}: good enough on {} of {scenes} scenes, at {}. This also holds with any one scene or class of scenes left out, and with half or twice the tolerances.",
-            first.solver,
-            first.good[0],
-            speed(first)
-        ),
-        (None, Some(only)) => format!(
-            "{usage} {} if you need one solver for all {scenes} scenes: no other is good enough on every one. It runs at {}.",
-            only.solver,
-            speed(only)
-        ),
-        (None, None) if ranking.first.solvers.is_empty() => "No setting is good enough on any scene.".into(),
-        (None, None) if all.is_empty() => "No solver is good enough on all scenes: choose by scene.".into(),
-        (None, None) => format!(
-            "{} solvers are good enough on all scenes; which is fastest depends on the scene.",
-            all.len()
+    let equal: Vec<&Standing> = ranking.standings.iter().filter(|s| s.good[0] == first.good[0]).collect();
+    let on = match first.good[0] == scenes {
+        true if scenes == 1 => "the scene".to_string(),
+        true => format!("all {scenes} scenes"),
+        false => format!("{} of {scenes} scenes", first.good[0]),
+    };
+    let rate = format!("{} of the speed of each scene's fastest", speed(first, scenes));
+    text += &match (first.good[0] == scenes, &equal[..]) {
+        (true, [_]) => format!("Use {}: it alone is good enough on {on}, at {rate}.", first.solver),
+        (true, _) => format!("Use {}: good enough on {on}, at {rate}.", first.solver),
+        (false, _) => format!(
+            "No solver is good enough on all {scenes} scenes: choose by kind. {} is on {on}, at {rate}.",
+            first.solver
         ),
     };
-    match (ranking.leader(), only) {
-        (Some(first), Some(only)) if only.solver != first.solver => {
-            text += &format!(" Only {} is good enough on all of them, at {}.", only.solver, speed(only));
-        }
-        (None, _) if ranking.first.solvers.len() > 1 => {
-            let first = first_places(&ranking.first, 6);
-            text += &format!(
-                "  No solver is the fastest throughout: with a scene or class left out or other tolerances, first is {first}."
-            );
-        }
-        _ => {}
+    if ranking.leader().is_some_and(|leader| leader.solver == first.solver) {
+        text +=
+            " No other is faster with any one scene or class of scenes left out, or with half or twice the tolerances.";
     }
-    let words = ["stay where they are placed at rest", "arrive at rest", "need not come to rest"];
-    let classes = words.iter().zip(&ranking.first_in).filter(|(_, first)| !first.solvers.is_empty());
-    let classes = classes.map(|(words, first)| format!("{} where bodies {words}", first_places(first, 3)));
-    let classes: Vec<String> = classes.collect();
-    if classes.len() > 1 {
-        text += &format!("  First by class of scenes: {}.", classes.join("; "));
-    }
-    if let Some(place) = standings.iter().position(|s| s.solver == DEFAULT) {
-        let Standing { good, fails_on, .. } = &standings[place];
-        let not =
-            if fails_on.is_empty() { String::new() } else { format!(", not on {}", short_list(fails_on, 4)) };
-        text += &format!(
-            "\n{DEFAULT}, the default, is number {} of {} by score: good enough on {} of {scenes} scenes{not}.",
-            place + 1,
-            standings.len(),
-            good[0]
-        );
+    if let Some(own) = ranking.standings.iter().find(|s| s.solver == DEFAULT && s.solver != first.solver) {
+        text += &format!(" {DEFAULT}, the default, is on {}.", own.good[0]);
     }
     text + "\n"
 }
 
-/// `a in 9 of 12, b in 4`: first places, which may be shared.
-fn first_places(first: &FirstPlaces, most: usize) -> String {
-    let place = |(i, (solver, count)): (usize, &(&str, usize))| match i {
-        0 => format!("{solver} in {count} of {}", first.variations),
-        _ => format!("{solver} in {count}"),
+/// A sentence for each kind of scene, with the name of the kind; a few scenes that are not in the catalog have their own.
+fn by_kind(records: &[Record]) -> Vec<[String; 2]> {
+    let of_kind = |kind: SceneKind| -> Vec<Record> {
+        records.iter().filter(|r| SceneKind::of(&r.scene) == Some(kind)).cloned().collect()
     };
-    short_list(&first.solvers.iter().enumerate().map(place).collect::<Vec<_>>(), most)
+    let kinds = SceneKind::ALL.map(|kind| (kind, of_kind(kind)));
+    let broad = kinds.iter().filter(|(_, own)| !own.is_empty()).count() >= BROAD;
+    let mut points = Vec::new();
+    for (kind, own) in kinds {
+        let name = kind.words();
+        let scenes = own.chunk_by(|a, b| a.scene == b.scene).count();
+        match scenes {
+            0 if broad => points.push([
+                capital(name),
+                format!("not in this study; `simpulse study --scenes {}` compares solvers.", kind.examples()),
+            ]),
+            0 => {}
+            _ => points.push([format!("{}, {}", capital(name), number(scenes, "scene")), kind_sentence(&own)]),
+        }
+    }
+    let others: Vec<Record> = records.iter().filter(|r| SceneKind::of(&r.scene).is_none()).cloned().collect();
+    let scenes: Vec<&[Record]> = others.chunk_by(|a, b| a.scene == b.scene).collect();
+    match scenes.len() {
+        few if few <= MOST_OWN => points.extend(scenes.iter().map(|own| [own[0].scene.clone(), kind_sentence(own)])),
+        many => points.push([format!("Other scenes, {many}"), kind_sentence(&others)]),
+    }
+    points
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// Which solver to use on scenes of a kind, what is faster or the next, and what fails on all of them.
+fn kind_sentence(records: &[Record]) -> String {
+    let ranking = ranking(records);
+    let scenes = records.chunk_by(|a, b| a.scene == b.scene).count();
+    let Some(first) = widest(&ranking) else { return "no solver is good enough.".to_string() };
+    let mut text = match scenes {
+        1 => format!("{}, ", first.solver),
+        _ if first.fails_on.is_empty() => format!("{}, good enough on all, ", first.solver),
+        _ => format!("{}, good enough except on {}, ", first.solver, short_list(&first.fails_on, 3)),
+    };
+    text += &match first.score > (1.0 - TIE) * first.good[0] as f64 / scenes as f64 {
+        true => "the fastest there".to_string(),
+        false => format!("at {} of the speed of each scene's fastest", speed(first, scenes)),
+    };
+    let others = || ranking.standings.iter().filter(|s| s.solver != first.solver && s.score > 0.0);
+    if let Some(faster) = others().find(|s| s.score > first.score * (1.0 + TIE)) {
+        let not_on = short_list(&faster.fails_on, 3);
+        text += &format!("; {} is faster ({}), but not good enough on {not_on}", faster.solver, speed(faster, scenes));
+    } else if let Some(next) = others().find(|s| s.good[0] == first.good[0]) {
+        text += &format!("; next is {} at {}", next.solver, speed(next, scenes));
+    }
+    let never: Vec<&str> = ranking.standings.iter().filter(|s| s.good[0] == 0).map(|s| s.solver).collect();
+    if !never.is_empty() {
+        text += &format!("; good enough on none: {}", short_list(&never, 4));
+    }
+    text + "."
 }
 
 /// The first few of a list.
@@ -137,7 +177,7 @@ fn warnings(records: &[Record], steps: Option<u32>) -> String {
     let samples = || records.iter().filter_map(|r| r.sample.as_ref());
     let timed = samples().count().max(1) as f64;
     let waited = samples().map(|s| s.waited).sum::<f64>() / timed;
-    if waited > BUSY {
+    if waited >= BUSY {
         text += &format!(
             "WARNING: this machine was busy: the timed thread waited for a processor {:.0} % of the time. That is taken \
              out of the times. Fewer blocks remain to compare, so more differences are ties. Run again on an idle machine.\n",
@@ -175,7 +215,7 @@ fn warnings(records: &[Record], steps: Option<u32>) -> String {
 fn head(records: &[Record], environment: &Environment, scenes: usize) -> String {
     let ran = |order: &Order| records.iter().any(|r| r.order == *order);
     let mut ways: Vec<String> =
-        Order::ALL.into_iter().filter(ran).map(|order| format!("{} order", order.name())).collect();
+        Order::ALL.into_iter().filter(ran).map(|order| format!("{} order", order_name(order))).collect();
     let mut widths = distinct(records.iter().filter(|r| r.order == Order::Colored).map(|r| r.lanes));
     widths.sort_unstable();
     if let (Some(last), Some(widest)) = (ways.last_mut(), widths.last()) {
@@ -184,11 +224,11 @@ fn head(records: &[Record], environment: &Environment, scenes: usize) -> String 
         *last += &format!(" at {} lane{}{emulated}", list.join(", "), if widths == [1] { "" } else { "s" });
     }
     let holding = records.iter().filter(|r| r.holds()).count();
-    let [plausible, tight, exact] = Accuracy::ALL.map(|a| records.iter().filter(|r| r.is_good(a)).count());
+    let [good, tighter, tightest] = Accuracy::ALL.map(|a| records.iter().filter(|r| r.is_good(a)).count());
     let rounds = records.iter().filter_map(|r| Some(r.sample.as_ref()?.rounds)).max().unwrap_or(0);
     format!(
         "{}, {}; {}; {} common to all settings\n\
-         {} settings: {holding} hold, {plausible} are plausible, {tight} tight, {exact} exact · {}; {}: {} lanes per instruction\n",
+         {} settings: {holding} hold, {good} are good enough, {tighter} also 10 × tighter, {tightest} 100 × tighter · {}; {}: {} lanes per instruction\n",
         number(scenes, "scene"),
         number(solvers_of(records).len(), "solver"),
         ways.join(", "),
@@ -200,38 +240,38 @@ fn head(records: &[Record], environment: &Environment, scenes: usize) -> String 
     )
 }
 
-/// A table with the cheapest setting of each scene, and a line for each scene without one; `file` is the path of a
-/// scene that is not in the catalog.
+/// A table with the cheapest setting of each scene or, where none is good enough, the nearest one and what it misses;
+/// and lines on scenes where nothing holds. `file` is the path of a scene that is not in the catalog.
 pub fn cheapest(scenes: &[Answer], records: &[Record], file: &str) -> (DocTable, String) {
-    let head = ["scene", "solver", "budget", "µs/step", "median", "longest", "next", "slower"];
+    let head = ["scene", "solver", "setting", "µs/step", "longest", "next", "slower"];
     let mut rows = DocTable::new("The cheapest setting that is good enough", 3, &head);
     let mut notes = String::new();
     for answer in scenes {
+        let scene = DocCell::scene(answer.scene);
         match (answer.best(), answer.nearest) {
             (Some(best), _) => {
                 let [solver, others @ ..] = setting(best);
-                let mut cells = vec![DocCell::scene(answer.scene), DocCell::solver(&solver)];
+                let mut cells = vec![scene, DocCell::solver(&solver)];
                 cells.extend(others.map(DocCell::from));
                 cells.extend(runner_up(answer, best).map(DocCell::from));
                 rows.row(cells);
             }
             (None, Some(nearest)) => {
-                let [solver, budget, time, ..] = setting(nearest);
-                let why = verdict(nearest);
-                notes += &format!(
-                    "{}: none is good enough; nearest is {solver}, {budget}, {time} µs: {why}\n",
-                    answer.scene
-                );
+                let [solver, words, times @ ..] = setting(nearest);
+                let why = format!("nearest is {solver}, {words}: {}", verdict(nearest));
+                let mut cells = vec![scene, DocCell::from("none").tone(Tone::Bad), why.into()];
+                cells.extend(times.map(DocCell::from));
+                cells.extend(["–", "–"].map(DocCell::from));
+                rows.row(cells);
             }
             (None, None) => {
                 notes += &format!("{}: no setting holds\n", answer.scene);
                 if let Some(last) = fails_last(records.iter().filter(|r| r.scene == answer.scene)) {
-                    let stem = answer.scene.split(':').next();
-                    let is_known = CATALOG.iter().any(|entry| Some(entry.name) == stem);
+                    let is_known = SceneKind::of(answer.scene).is_some();
                     notes += &format!(
                         "  longest is {}, {}: {}; to see it: {}\n",
                         last.solver,
-                        by_scene::setting(last),
+                        last.setting_text(),
                         last.why_failed().unwrap_or_default(),
                         last.command_to_see(if is_known { answer.scene } else { file })
                     );
@@ -242,16 +282,15 @@ pub fn cheapest(scenes: &[Answer], records: &[Record], file: &str) -> (DocTable,
     (rows, notes)
 }
 
-/// Solver, budget with lanes, mean, median and longest step.
-fn setting(record: &Record) -> [String; 5] {
+/// Solver, setting, mean and longest step.
+fn setting(record: &Record) -> [String; 4] {
     let time = |ns: fn(&crate::lab::study::sample::Sample) -> f64| {
         record.sample.as_ref().map_or("–".to_string(), |sample| digits(ns(sample) / 1e3))
     };
     [
         record.solver.to_string(),
-        by_scene::setting(record),
+        record.setting_text(),
         time(|sample| sample.mean_ns),
-        time(|sample| sample.median_ns),
         time(|sample| sample.worst_ns),
     ]
 }
@@ -290,15 +329,12 @@ fn runner_up(answer: &Answer, best: &Record) -> [String; 2] {
     [next.solver.to_string(), by]
 }
 
-/// Errors of the cheapest plausible setting (% of their tolerances), and the cheapest settings at the
+/// Errors of the cheapest setting that is good enough (% of their tolerances), and the cheapest settings at the
 /// stricter levels.
 fn accuracies(scenes: &[Answer], records: &[Record]) -> DocTable {
-    let caption = "Its errors in % of the tolerances, and the cheapest settings that are tight and exact";
-    let mut rows = DocTable::new(
-        caption,
-        1,
-        &["scene", "pen.", "res.", "ref.", "rest", "tight: solver, budget", "µs", "exact", "µs"],
-    );
+    let caption = "Its errors in % of the tolerances, and the cheapest settings within stricter ones";
+    let head = ["scene", "overlap", "force error", "reference", "rest", "10 × tighter", "µs", "100 × tighter", "µs"];
+    let mut rows = DocTable { page_only: true, ..DocTable::new(caption, 1, &head) };
     for scene in records.chunk_by(|a, b| a.scene == b.scene) {
         let best = scenes.iter().find(|a| a.scene == scene[0].scene).and_then(Answer::best);
         let share = |axis: ErrorAxis| best.and_then(|r| r.in_tolerance(axis)).map_or("–".into(), percent);
@@ -312,7 +348,7 @@ fn accuracies(scenes: &[Answer], records: &[Record]) -> DocTable {
                     cells.extend(["the same".to_string(), String::new()]);
                 }
                 Some(best) => cells.extend([
-                    format!("{}, {}", best.solver, by_scene::setting(best)),
+                    format!("{}, {}", best.solver, best.setting_text()),
                     digits(best.cost_ns() / 1e3),
                 ]),
                 None => cells.extend(["none".to_string(), "–".to_string()]),
@@ -325,24 +361,25 @@ fn accuracies(scenes: &[Answer], records: &[Record]) -> DocTable {
 
 /// A table of all solvers over all scenes.
 fn standings(ranking: &Ranking, scenes: usize) -> DocTable {
-    const CAPTION: &str = "\
-Ranking over all scenes. score: time of the fastest solver ÷ time of this one, each at its cheapest good-enough setting, \
-averaged over scenes (0 where it is not good enough); range: with any scene or class left out, and with half or twice the \
-tolerances; placed, arrives, moves: score where bodies start at rest, come to rest, or need not; then numbers of scenes";
-    let [placed, arrives, moves] = SceneClass::ALL.map(SceneClass::word);
-    let [plausible, tight, exact] = Accuracy::ALL.map(Accuracy::word);
-    let head =
-        ["solver", "score", "range", placed, arrives, moves, plausible, tight, exact, "fastest", "fails on"];
-    let caption = format!("{CAPTION}, of {scenes}");
+    let caption = format!(
+        "Ranking over all {scenes} scenes: on how many a solver is good enough, on which it is not, and on how many it is the fastest or \
+         ties. score: time of the fastest solver ÷ time of this one, each at its cheapest setting that is good enough, averaged \
+         over scenes (0 where none is); range: with any scene or class left out, and with half or twice the tolerances; first: in \
+         how many of these {} variations",
+        ranking.first.variations
+    );
+    let [good, tighter, tightest] = Accuracy::ALL.map(Accuracy::word);
+    let head = ["solver", good, tighter, tightest, "not on", "fastest", "score", "range", "first"];
     let mut rows = DocTable { most: MOST_RANKED, ..DocTable::new(caption, 1, &head) };
     for own in &ranking.standings {
+        let fails = if own.fails_on.is_empty() { "–".into() } else { short_list(&own.fails_on, 2) };
+        let first = ranking.first.solvers.iter().find(|(name, _)| *name == own.solver).map_or(0, |(_, n)| *n);
         let [low, high] = own.range;
         let mut cells = vec![DocCell::solver(own.solver)];
-        cells.extend([format!("{:.2}", own.score), format!("{low:.2}–{high:.2}")].map(DocCell::from));
-        cells.extend(own.by_class.map(|score| score.map_or("–".into(), |s| format!("{s:.2}")).into()));
-        cells.extend(own.good.into_iter().chain([own.fastest]).map(|n| n.to_string().into()));
-        let fails = if own.fails_on.is_empty() { "–".into() } else { short_list(&own.fails_on, 2) };
+        cells.extend(own.good.map(|n| n.to_string().into()));
         cells.push(DocCell { title: own.fails_on.join(", "), ..fails.into() });
+        let score = [format!("{:.2}", own.score), format!("{low:.2}–{high:.2}"), first.to_string()];
+        cells.extend([own.fastest.to_string()].into_iter().chain(score).map(DocCell::from));
         rows.row(cells);
     }
     rows
@@ -370,7 +407,7 @@ fn differing(records: &[Record]) -> String {
 
 /// Table of the settings that hold in their run and fail in the extended one.
 pub fn fail_later(records: &[Record]) -> DocTable {
-    let head = ["scene", "solver", "budget", "µs/step", "within a minute"];
+    let head = ["scene", "solver", "setting", "µs/step", "within a minute"];
     let mut rows = DocTable::new("Settings that pass their run, and then fail", 3, &head);
     for record in each_setting(records) {
         if let Some(why) = record.fails_later() {
@@ -406,8 +443,8 @@ mod tests {
             line.split_whitespace().collect::<Vec<_>>().join(" ")
         };
         // A build with narrower instructions emulates eight lanes and says so.
-        let lanes = if is_emulated(8) { "@8 emulated" } else { "@8" };
-        let expected = format!("stack:2 pgs 2 sub {lanes} 41.0 41.0 41.0 no other solver –");
+        let lanes = if is_emulated(8) { "8 lanes, emulated" } else { "8 lanes" };
+        let expected = format!("stack:2 pgs 2 substeps, {lanes} 41.0 41.0 no other solver –");
         assert_eq!(line(&records), expected);
         let with = |time| [&records[..], &[other(time)]].concat();
         assert!(line(&with(61.5)).ends_with("soft_step 50 %"), "{}", line(&with(61.5)));
@@ -418,15 +455,11 @@ mod tests {
     #[test]
     fn a_scene_without_an_answer_says_why() {
         let over = page(&[record(1, 1, 20.0, 14e-3)]);
-        assert!(
-            over.contains(
-                "stack:2: none is good enough; nearest is pgs, 1 sub @1, 20.0 µs: 1.40 × tolerance of"
-            ),
-            "{over}"
-        );
+        let words = over.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(words.contains("stack:2 none nearest is pgs, 1 substeps, 1 lane: 1.40 × tolerance of"), "{over}");
         let text = page(&[failed(1), fell(8, 1, 1.0, 0.0)]);
         assert!(text.contains("stack:2: no setting holds\n"), "{text}");
-        assert!(text.contains("2 settings: 0 hold, 0 are plausible"), "{text}");
+        assert!(text.contains("2 settings: 0 hold, 0 are good enough"), "{text}");
     }
 
     #[test]
@@ -440,16 +473,15 @@ mod tests {
             on("y", "soft_step", 9.0),
         ];
         let text = page(&steady);
-        assert!(text.starts_with("Use shim: good enough on 2 of 2 scenes"), "{text}");
-        assert!(text.contains("shim, the default, is number 1 of 2"), "{text}");
+        assert!(text.starts_with("Use shim: good enough on all 2 scenes, at 100 % of the speed"), "{text}");
+        assert!(text.contains("No other is faster with any one"), "{text}");
         let mut torn = steady.clone();
         torn[3] = on("y", "soft_step", 1.0);
         let text = page(&torn);
-        assert!(
-            text.starts_with("2 solvers are good enough on all scenes")
-                && text.replace('\n', " ").contains("first is soft_step in 4 of 5, shim in 1"),
-            "{text}"
-        );
+        let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(words.starts_with("Use soft_step: good enough on all 2 scenes, at 83 % of the speed"), "{text}");
+        assert!(words.contains("shim, the default, is on 2.") && !text.contains("No other is faster"), "{text}");
+        assert!(words.contains("x: shim, the fastest there; next is soft_step at 67 %."), "{text}");
     }
 
     #[test]
@@ -464,7 +496,7 @@ mod tests {
         ];
         let text = page(&records);
         let line = |part: &str| text.lines().any(|l| l.starts_with("stack:2") && l.contains(part));
-        assert!(line("fell at step 800") && line("2 sub @8"), "{text}");
+        assert!(line("fell at step 800") && line("2 substeps, 8 lanes"), "{text}");
         assert_eq!(fail_later(&records).rows.len(), 1);
     }
 

@@ -1,9 +1,10 @@
 //! The tables of one scene, of performance profiles and of treatments of contacts.
 
 use super::doc::{DocCell, DocTable, Tone};
-use super::units::{bodies, digits, is_emulated, ratio, si};
+use super::units::{bodies, digits, is_emulated, lanes_or_order, order, percent, ratio, si};
 use crate::engine::world::Order;
 use crate::lab::metrics::Errors;
+use crate::lab::scenes::kind::SceneKind;
 use crate::lab::scenes::tolerance::Accuracy;
 use crate::lab::study::curve::{ErrorAxis, distinct, solvers_of};
 use crate::lab::study::profile::Profile;
@@ -12,14 +13,15 @@ use crate::lab::study::{Record, answer};
 
 /// Description of the columns of [`scene_table`], printed once per study.
 pub const LEGEND: &str = "\
-budget: substeps; then velocity (vel), relaxation (rel) and position (pos) sweeps per substep.
-lanes: natural means one contact after the other in natural order; a number means colored order in so many lanes.
+setting: substeps × the velocity, relax and position sweeps in each.
+lanes: file order means one contact after the other; a number means parallel order (colors of contacts) in so many lanes.
 The errors are the same for all lane widths of a budget.
 µs/step: mean over the run, its median and its longest step, ± median deviation of a repeat.  ns/contact: mean step ÷ mean
 number of contacts.  ns/row: time of a sweep per constraint row.
 speed-up: over 1 lane.
-penetration: as judged (99 % of contact points, and the maximum at rest), and maximum.  residual: rms of the
-contact law, in the weight of the lighter body × step, and in the mean weight of a body × step.
+overlap: as judged (what the solver left at 99 % of contact points, and the largest at rest), and largest.
+force error: how far contact impulses are from the contact law (no pull, no push across a gap, Coulomb friction), root
+mean square, in % of the weight of the lighter body, and of the mean weight of a body.
 energy, momentum: relative change.  rest speed: rms over the last second.
 reference: distance to the scene's reference value; missed if the run never reached it, – if none is known.
 sweeps: per step.  colors: of contacts.  occupancy: share of lanes that hold a contact.
@@ -43,7 +45,7 @@ pub fn scene_line(records: &[Record]) -> String {
 type TableColumn = (&'static str, fn(&Record) -> String);
 
 const COLUMNS: [TableColumn; 21] = [
-    ("budget", |r| r.budget_text.clone()),
+    ("setting", |r| r.budget_text.clone()),
     ("lanes", lanes),
     ("µs/step", |r| timed(r, |s| digits(s.mean_ns / 1e3))),
     ("median", |r| timed(r, |s| digits(s.median_ns / 1e3))),
@@ -54,10 +56,10 @@ const COLUMNS: [TableColumn; 21] = [
     }),
     ("ns/row", |r| timed(r, |s| digits(s.row_sweep_ns))),
     ("speed-up", |r| r.speed_up.map_or(String::new(), digits)),
-    ("penetration\njudged", |r| measured(r, |e| si(e.penetration(r.tolerances.rest.is_some()), "m"))),
+    ("overlap\njudged", |r| measured(r, |e| si(e.penetration(r.tolerances.rest.is_some()), "m"))),
     ("\nmax", |r| measured(r, |e| si(e.penetration_max(), "m"))),
-    ("residual\nlighter", |r| measured(r, |e| ratio(e.law_rms_lighter()))),
-    ("\nbody", |r| measured(r, |e| ratio(e.law_rms_body()))),
+    ("force error\nlighter", |r| measured(r, |e| percent(e.law_rms_lighter()))),
+    ("\nmean", |r| measured(r, |e| percent(e.law_rms_body()))),
     ("energy", |r| measured(r, |e| ratio(e.get("energy_change").unwrap_or_default()))),
     ("momentum", |r| measured(r, |e| ratio(e.get("momentum").unwrap_or_default()))),
     ("rest speed", |r| measured(r, |e| si(e.rest_velocity(), "m/s"))),
@@ -78,14 +80,14 @@ fn measured(record: &Record, show: impl Fn(&Errors) -> String) -> String {
 
 /// The columns of a brief table.
 const BRIEF: [&str; 10] = [
-    "budget",
+    "setting",
     "lanes",
     "µs/step",
     "longest",
     "±",
     "ns/contact",
-    "penetration\njudged",
-    "residual\nlighter",
+    "overlap\njudged",
+    "force error\nlighter",
     "reference",
     "verdict",
 ];
@@ -107,7 +109,7 @@ pub fn scene_table(records: &[Record]) -> (DocTable, String) {
     let mut notes = String::new();
     let mut previous: Option<&Record> = None;
     for &record in &lines {
-        let name = format!("{}, {}", record.solver, setting(record));
+        let name = format!("{}, {}", record.solver, record.setting_text());
         let key = |r: &Record| (r.solver, r.budget_text.clone(), r.order);
         let same_order = previous.is_some_and(|p| key(p) == key(record));
         if let (Some(failure), false) = (record.failure, same_order) {
@@ -154,17 +156,47 @@ fn table_of(lines: &[&Record], keep: impl Fn(&str) -> bool) -> DocTable {
     rows
 }
 
-/// `7 sub 1 vel 1 rel @8`: the budget, and the lanes or the order.
-pub fn setting(record: &Record) -> String {
-    format!("{} @{}", record.budget_text, lanes(record))
-}
-
 fn lanes(record: &Record) -> String {
     match record.order {
         Order::Colored if is_emulated(record.lanes) => format!("{} emulated", record.lanes),
         Order::Colored => record.lanes.to_string(),
-        order => order.name().to_string(),
+        serial => lanes_or_order(serial, 1),
     }
+}
+
+/// The cheapest good setting of every solver on every scene or, if it has none, its nearest one or a failure.
+pub fn every_solver(records: &[Record]) -> DocTable {
+    let head = [
+        "kind", "scene", "solver", "setting", "µs/step", "× fastest", "overlap", "force error", "reference", "verdict",
+    ];
+    let mut rows = DocTable { class: "filtered", ..DocTable::new("Every solver on every scene", 4, &head) };
+    for scene in records.chunk_by(|a, b| a.scene == b.scene) {
+        let least = scene.iter().filter(|r| r.excess() <= 1.0).map(Record::cost_ns).fold(f64::INFINITY, f64::min);
+        for solver in solvers_of(scene) {
+            let own: Vec<Record> = scene.iter().filter(|r| r.solver == solver).cloned().collect();
+            let Some(answer) = answer::Answer::of(&own) else { continue };
+            let Some(record) = answer.best().or(answer.nearest).or(answer::fails_last(&own)) else { continue };
+            let good = answer.best().is_some();
+            let slower = if good { format!("{}×", digits(record.cost_ns() / least)) } else { String::new() };
+            let cells = [
+                SceneKind::of(&record.scene).map_or("", SceneKind::words).into(),
+                DocCell::scene(&record.scene),
+                DocCell::solver(solver),
+                record.setting_text().into(),
+                timed(record, |s| digits(s.mean_ns / 1e3)).into(),
+                slower.into(),
+                measured(record, |e| si(e.penetration(record.tolerances.rest.is_some()), "m")).into(),
+                measured(record, |e| percent(e.law_rms_lighter())).into(),
+                record.truth.map_or(String::new(), |t| t.error.map_or("missed".into(), |e| si(e, t.unit))).into(),
+                DocCell::from(verdict(record)).tone(if good { Tone::Good } else { Tone::Bad }),
+            ];
+            rows.row(cells.map(|cell| match cell.text.as_str() {
+                "" => DocCell::from("–"),
+                _ => cell,
+            }));
+        }
+    }
+    rows
 }
 
 /// `good enough`, the failure, or what exceeds its tolerance most, and by how much.
@@ -217,11 +249,11 @@ pub fn treatment_tables(records: &[Record]) -> Vec<DocTable> {
     impacts.into_iter().chain(chosen_tables(records)).collect()
 }
 
-/// Those that take several values only if somebody asks for it: frozen contacts, and orders besides natural and colored.
+/// Those that take several values only if somebody asks for it: frozen contacts, and orders besides file and parallel.
 pub fn chosen_tables(records: &[Record]) -> Vec<DocTable> {
     let frozen = treatments("frozen contacts", records, |r| r.frozen.to_string().replace("off", "fresh"));
     let others = records.iter().any(|r| matches!(r.order, Order::Reversed | Order::Shuffled));
-    let orders = treatments("orders of contacts", records, |r| r.order.name().to_string());
+    let orders = treatments("orders of contacts", records, |r| order(r.order).to_string());
     frozen.into_iter().chain(orders.filter(|_| others)).collect()
 }
 
@@ -229,10 +261,10 @@ pub fn chosen_tables(records: &[Record]) -> Vec<DocTable> {
 fn treatments(name: &str, records: &[Record], of: impl Fn(&Record) -> String) -> Option<DocTable> {
     let caption = format!(
         "What {name} gain and cost: settings that hold in their run; numbers of scenes on which a setting of the solver holds, is \
-         plausible and tight; time of its cheapest plausible setting over that of its first line, geometric mean; scenes that \
+         good enough and 10 × tighter; time of its cheapest good setting over that of its first line, geometric mean; scenes that \
          are better (+) or worse (−) than in its first line"
     );
-    let head = ["solver", name, "settings", "holds", "plausible", "tight", "time", "+", "−"];
+    let head = ["solver", name, "settings", "holds", "good enough", "10 × tighter", "time", "+", "−"];
     let mut rows = DocTable { wide: true, ..DocTable::new(caption, 2, &head) };
     for solver in solvers_of(records) {
         let values_of = |records: &[Record]| distinct(records.iter().filter(|r| r.solver == solver).map(&of));
@@ -290,8 +322,8 @@ mod tests {
         assert!(text.contains(" fell at step 100") && text.contains(" good enough"), "{text}");
         assert_eq!(text.matches("1.23 mm").count(), 4, "{text}");
         assert_eq!(text.matches(" blew up at step 7").count(), 1, "{text}");
-        assert!(text.contains("failed: pgs, 9 sub @1: diverged at step 7: body 2 has no finite speed"));
-        assert!(text.contains("state differs from the error run: pgs, 1 sub @8"));
+        assert!(text.contains("failed: pgs, 9 substeps, 1 lane: diverged at step 7: body 2 has no finite speed"));
+        assert!(text.contains("state differs from the error run: pgs, 1 substeps, 8 lanes"));
         // No cell is empty.
         let columns = |line: &str| line.split("  ").filter(|cell| !cell.trim().is_empty()).count();
         let lines: Vec<usize> = text.lines().skip(3).take(4).map(columns).collect();
@@ -301,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn orders_are_compared_if_others_than_natural_and_colored_ran() {
+    fn orders_are_compared_if_others_than_file_and_parallel_ran() {
         let in_order = |order: Order, own: Record| Record { order, ..own };
         let mut records = vec![
             in_order(Order::Natural, record(1, 1, 9.0, 2e-3)),
@@ -313,7 +345,7 @@ mod tests {
         ];
         let text = chosen_tables(&records)[0].text();
         for line in
-            ["natural 2 of 2 1 of 1 1 of 1", "reversed 1 of 2 1 of 1 1 of 1 0 of 1 2.00", "colored 1 of 1"]
+            ["file 2 of 2 1 of 1 1 of 1", "reversed 1 of 2 1 of 1 1 of 1 0 of 1 2.00", "parallel 1 of 1"]
         {
             let words = |l: &str| l.split_whitespace().collect::<Vec<_>>().join(" ");
             assert!(text.lines().any(|l| words(l).contains(line)), "{line}: {text}");
@@ -350,7 +382,7 @@ mod tests {
         let records =
             [record(8, 1, 10.0, 0.1), record(8, 2, 20.0, 0.001), soft(1, 10.1, 0.1), soft(2, 20.2, 0.001)];
         let text = profile_table(&records).text();
-        assert!(text.contains("penetration in tolerance") && text.contains("1 of 1"), "{text}");
+        assert!(text.contains("overlap in tolerance") && text.contains("1 of 1"), "{text}");
         assert_eq!(text.matches("100 %").count(), 16, "{text}");
         assert!(profile_table(&[]).rows.is_empty());
     }

@@ -50,7 +50,7 @@ const fn column([name, unit, meaning]: [&'static str; 3]) -> Column {
     Column { name, unit, meaning }
 }
 
-fn listed(columns: &[[&'static str; 3]]) -> Vec<Column> {
+pub(super) fn listed(columns: &[[&'static str; 3]]) -> Vec<Column> {
     columns.iter().copied().map(column).collect()
 }
 
@@ -84,7 +84,7 @@ const SETTING: &[(Column, StudyCell)] = &[
     cell("class", "", "placed at rest, arrives at rest, or moves", |r, _| r.class.word().into()),
     cell("dt_s", "s", "length of a step", |r, _| r.dt.into()),
     cell("solver", "", "name of the solver", |r, _| r.solver.into()),
-    cell("order", "", "constraint order: natural, reversed, shuffled or colored", |r, _| {
+    cell("order", "", "order of constraints: natural (that of the file), reversed, shuffled or colored (parallel)", |r, _| {
         r.order.name().into()
     }),
     cell("lanes", "", "lanes per instruction", |r, _| r.lanes.into()),
@@ -139,7 +139,7 @@ const SETTING: &[(Column, StudyCell)] = &[
     cell("ns_per_row_sweep", "ns", "time of a sweep per constraint row, median", |r, _| {
         sample(r, |s| s.row_sweep_ns)
     }),
-    cell("speed_up", "1", "times faster than one lane in colored order", |r, _| r.speed_up.into()),
+    cell("speed_up", "1", "times faster than one lane in parallel order", |r, _| r.speed_up.into()),
     cell("steps", "", "steps over which errors were measured", |r, _| r.errors.map(|e| e.steps).into()),
     cell("points", "", "contact points over all steps", |r, _| r.errors.map(|e| e.points).into()),
     cell(
@@ -178,10 +178,10 @@ const VERDICT: &[(Column, StudyCell)] = &[
     cell("failed_step", "", "step at which it stopped holding", |r, _| {
         r.broken.map(|b| b.step).or(r.failure.map(|f| f.step)).into()
     }),
-    cell("tolerance_penetration_m", "m", "tolerance of penetration_judged_m in a plausible run", |r, _| {
+    cell("tolerance_penetration_m", "m", "limit of penetration_judged_m for good enough", |r, _| {
         r.tolerances.penetration.value.into()
     }),
-    cell("tolerance_residual", "1", "tolerance of residual_rms_lighter_weights", |r, _| {
+    cell("tolerance_residual", "1", "limit of residual_rms_lighter_weights for good enough", |r, _| {
         r.tolerances.residual.value.into()
     }),
     cell("tolerance_reference", "*", "tolerance of reference_error, in reference_unit", |r, _| {
@@ -193,11 +193,11 @@ const VERDICT: &[(Column, StudyCell)] = &[
         "tolerance of the speed at rest; empty where nothing has to rest",
         |r, _| r.tolerances.rest.map(|t| t.value).into(),
     ),
-    cell("plausible", "", "holds, also for a minute if it has to rest, within every tolerance", |r, _| {
+    cell("plausible", "", "good enough: holds, also for a minute if it has to rest, within every tolerance", |r, _| {
         r.is_good(Accuracy::Plausible).into()
     }),
-    cell("tight", "", "the same within 10 % of the tolerances", |r, _| r.is_good(Accuracy::Tight).into()),
-    cell("exact", "", "the same within 1 %", |r, _| r.is_good(Accuracy::Exact).into()),
+    cell("tight", "", "10 × tighter: the same within 10 % of the tolerances", |r, _| r.is_good(Accuracy::Tight).into()),
+    cell("exact", "", "100 × tighter: the same within 1 %", |r, _| r.is_good(Accuracy::Exact).into()),
     cell("later_seconds", "s", "length of the extended run; empty without one", |r, _| {
         r.later.map(|l| l.seconds).into()
     }),
@@ -271,13 +271,13 @@ pub static CONVERGE: Sheet = Sheet {
             ["problem", "", "name of the frozen problem"],
             ["solver", "", "name of the solver, with its stage if it is only one of several"],
             ["arithmetic", "", "f32: code of the simulation; f64: methods for comparison"],
-            ["order", "", "natural, colored or shuffled"],
+            ["order", "", "natural (that of the file), colored (parallel) or shuffled"],
             ["start", "", "impulses at the start: cold (zero) or warm (those of the previous step)"],
             ["iterations", "", "iterations of the solver"],
             ["sweeps", "", "sweeps over the constraints"],
             ["time_ns", "ns", "time of these iterations, set-up excluded"],
-            ["rigid_residual", "1", "residual of the rigid contact law, in the problem's unit of impulse"],
-            ["own_residual", "1", "residual of the solver's own law"],
+            ["rigid_residual", "1", "force error under the rigid contact law, over the problem's unit of impulse"],
+            ["own_residual", "1", "force error under the solver's own law"],
             [
                 "velocity_error",
                 "1",
@@ -322,7 +322,7 @@ pub static CONTACTS: Sheet = Sheet {
             ["py", "m", "the same"],
             ["nx", "1", "normal, from a to b"],
             ["ny", "1", "the same"],
-            ["separation", "m", "at the start of the step; negative is penetration"],
+            ["separation", "m", "at the start of the step; negative is overlap"],
             ["normal_impulse", "N s", "on body b over the step"],
             ["tangent_impulse", "N s", "on body b over the step, along the normal turned clockwise"],
         ])
@@ -367,7 +367,7 @@ pub static JOINTS: Sheet = Sheet {
 };
 
 /// All kinds of CSV files.
-pub static SHEETS: [&Sheet; 5] = [&STUDY, &CONVERGE, &STATE, &CONTACTS, &JOINTS];
+pub static SHEETS: [&Sheet; 6] = [&STUDY, &super::ensemble::TIDY, &CONVERGE, &STATE, &CONTACTS, &JOINTS];
 
 impl Sheet {
     /// Names of the columns, in order.

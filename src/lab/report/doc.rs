@@ -34,6 +34,9 @@ impl Tone {
     }
 }
 
+/// On a page, cells with more characters than this break between words.
+const LONG: usize = 22;
+
 /// A cell of a table.
 #[derive(Clone, Debug, Default)]
 pub struct DocCell {
@@ -76,6 +79,7 @@ impl DocCell {
     fn html(&self, element: &str, left: bool) -> String {
         let mut classes = vec![self.tone.class()];
         classes.extend(left.then_some("left"));
+        classes.extend((self.text.chars().count() > LONG).then_some("long"));
         let classes = classes.join(" ");
         let attribute = |name: &str, value: &str| match value.trim() {
             "" => String::new(),
@@ -120,6 +124,8 @@ pub struct DocTable {
     pub wide: bool,
     /// As text: only so many rows; all for 0.
     pub most: usize,
+    /// Whether it is on pages only.
+    pub page_only: bool,
     /// On a page: the words that unfold it; empty if it is not folded.
     pub folded: String,
     /// On a page: its CSS class.
@@ -156,7 +162,7 @@ impl DocTable {
 
     fn html(&self) -> String {
         let class = format!("numbers {}", self.class);
-        let mut text = format!("<table class=\"{}\">", class.trim());
+        let mut text = format!("<div class=\"scroll\"><table class=\"{}\">", class.trim());
         if !self.caption.is_empty() && self.folded.is_empty() {
             text += &format!("<caption>{}</caption>", escaped(&self.caption));
         }
@@ -171,7 +177,7 @@ impl DocTable {
             let cell = |(i, c): (usize, &DocCell)| c.html(if i == 0 { "th" } else { "td" }, i < self.left);
             text += &format!("<tr>{}</tr>\n", row.iter().enumerate().map(cell).collect::<String>());
         }
-        text += "</tbody></table>\n";
+        text += "</tbody></table></div>\n";
         match self.folded.as_str() {
             "" => text,
             words => format!("<details><summary>{}</summary>\n{text}</details>\n", escaped(words)),
@@ -186,6 +192,8 @@ pub enum DocBlock {
     Heading(String, String),
     /// A paragraph. Line breaks stay.
     Text(Tone, String),
+    /// Sentences, each with the words that it is about.
+    Points(Vec<[String; 2]>),
     /// A table.
     Table(DocTable),
     /// Charts in a grid of this CSS class; pages only.
@@ -203,7 +211,10 @@ pub fn text(blocks: &[DocBlock]) -> String {
         DocBlock::Text(Tone::Lead, text) => lines(text) + "\n",
         DocBlock::Text(Tone::Soft, text) => format!("\n{}", lines(text)),
         DocBlock::Text(_, text) => lines(text),
-        DocBlock::Table(table) if table.rows.is_empty() => String::new(),
+        DocBlock::Points(points) => {
+            points.iter().map(|[about, words]| lines(&format!("{about}: {words}"))).collect::<String>() + "\n"
+        }
+        DocBlock::Table(table) if table.rows.is_empty() || table.page_only => String::new(),
         DocBlock::Table(table) => format!("\n{}", table.text()),
         DocBlock::Charts(..) | DocBlock::Html(_) => String::new(),
     };
@@ -219,6 +230,17 @@ pub fn lines(text: &str) -> String {
     whole.map(|line| line + "\n").collect()
 }
 
+/// A text as HTML; what stands between backquotes is code.
+fn marked(text: &str) -> String {
+    let lines: Vec<String> = text.trim().lines().map(escaped).collect();
+    let safe = lines.join("<br/>\n");
+    let part = |(i, part): (usize, &str)| match i % 2 {
+        0 => part.to_string(),
+        _ => format!("<code>{part}</code>"),
+    };
+    safe.split('`').enumerate().map(part).collect()
+}
+
 /// The document as HTML.
 pub fn html(blocks: &[DocBlock]) -> String {
     let one = |block: &DocBlock| match block {
@@ -227,16 +249,10 @@ pub fn html(blocks: &[DocBlock]) -> String {
             format!("<h3 id=\"{id}\">{name} <span class=\"soft\">{remark}</span></h3>\n")
         }
         DocBlock::Text(_, text) if text.trim().is_empty() => String::new(),
-        DocBlock::Text(tone, text) => {
-            // Every second part stands between backquotes.
-            let lines: Vec<String> = text.trim().lines().map(escaped).collect();
-            let safe = lines.join("<br/>\n");
-            let parts = safe.split('`').enumerate();
-            let marked = parts.map(|(i, part)| match i % 2 {
-                0 => part.to_string(),
-                _ => format!("<code>{part}</code>"),
-            });
-            format!("<p class=\"{}\">{}</p>\n", tone.class(), marked.collect::<String>())
+        DocBlock::Text(tone, text) => format!("<p class=\"{}\">{}</p>\n", tone.class(), marked(text)),
+        DocBlock::Points(points) => {
+            let point = |[about, words]: &[String; 2]| format!("<dt>{}</dt><dd>{}</dd>\n", escaped(about), marked(words));
+            format!("<dl>\n{}</dl>\n", points.iter().map(point).collect::<String>())
         }
         DocBlock::Table(table) if table.rows.is_empty() => String::new(),
         DocBlock::Table(table) => table.html(),

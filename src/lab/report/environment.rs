@@ -45,6 +45,13 @@ impl Environment {
 }
 
 impl Environment {
+    /// What decides the bits of results and which lanes are native: `with 16 lanes, fused multiply-adds`.
+    pub fn build(&self) -> String {
+        let fused = self.target_features.iter().any(|name| name == "fma") || self.architecture == "aarch64";
+        let rounding = if fused { "fused multiply-adds" } else { "separately rounded multiply-adds" };
+        format!("with {} lanes, {rounding}", self.native_lanes)
+    }
+
     /// Name of the widest instruction set that the compiler was allowed to use.
     pub fn instructions(&self) -> &'static str {
         let names = [

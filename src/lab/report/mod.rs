@@ -8,6 +8,7 @@ pub mod columns;
 #[doc(hidden)]
 pub mod doc;
 pub mod environment;
+pub mod ensemble;
 #[doc(hidden)]
 pub mod html;
 pub mod study_file;
@@ -27,7 +28,7 @@ use std::path::{Path, PathBuf};
 use study_file::StudyFile;
 
 /// Files of a study, besides its recordings.
-const FILES: [&str; 5] = ["tables.txt", "study.csv", study_file::NAME, found::NAME, html::NAME];
+const FILES: [&str; 7] = ["tables.txt", "study.csv", ensemble::NAME, study_file::NAME, found::NAME, html::NAME, "figures"];
 
 /// Moves the study that a folder holds to `previous/N` below it, with the first free number N, so that no study
 /// is ever overwritten. Returns the new place; `None` if the folder holds no study.
@@ -65,12 +66,13 @@ pub fn tables(records: &[Record]) -> String {
     text + &doc::text(&tables.collect::<Vec<_>>())
 }
 
-/// Writes `tables.txt`, `study.csv` and `study.json` into `folder`, and the [page](html) made from these and the
+/// Writes `tables.txt`, `study.csv`, `tidy.csv` and `study.json` into `folder`, and the [page](html) made from these and the
 /// folder's other files. Returns their paths. Everything except the page is prepared before the first file is written.
 pub fn write_study(folder: &Path, study: &StudyFile) -> Result<Vec<PathBuf>, Error> {
     let contents = [
         ("tables.txt", tables(&study.records).into_bytes()),
         ("study.csv", columns::study_csv(&study.records, &study.environment)?),
+        (ensemble::NAME, ensemble::csv(&study.records)?),
         (study_file::NAME, study.to_json()?),
     ];
     files::prepare_folder(folder)?;

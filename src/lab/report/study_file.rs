@@ -109,7 +109,8 @@ impl StudyFile {
 
     /// Merges parts with the same settings into one study; `names` are the names of the parts in errors.
     ///
-    /// Errors: no parts; parts with different settings; a scene in two parts.
+    /// Errors: no parts; parts with different settings, or of programs with other lanes or other rounding; a scene in two
+    /// parts.
     pub fn merged(parts: Vec<StudyFile>, names: &[String]) -> Result<Self, Error> {
         let Some(first) = parts.first() else { return Err(Error::invalid("merge", "no parts given")) };
         let mut whole =
@@ -119,6 +120,14 @@ impl StudyFile {
             let differs = |(name, _): &(String, [String; 2])| !["scenes", "budget_search"].contains(&&**name);
             if differing_settings(&part.settings, &first.settings).iter().any(differs) {
                 let message = format!("{name} was run with different settings than {}", names[0]);
+                return Err(Error::invalid("merge", message));
+            }
+            let builds = [part, first].map(|study| study.environment.build());
+            if builds[0] != builds[1] {
+                let message = format!(
+                    "{name} comes from a program {}, {} from one {}: their results differ; build both for the same processor",
+                    builds[0], names[0], builds[1]
+                );
                 return Err(Error::invalid("merge", message));
             }
             for scene in part.scenes() {
@@ -292,6 +301,14 @@ mod tests {
 
         let twice = StudyFile::merged(vec![of(&["a"], &[]), of(&["a"], &[])], &names).unwrap_err();
         assert_eq!(twice.to_string(), "merge: a is in one and in two");
+        let mut narrow = of(&["b"], &[]);
+        narrow.environment.native_lanes = 2;
+        let message = StudyFile::merged(vec![of(&["a"], &[]), narrow], &names).unwrap_err().to_string();
+        assert!(message.starts_with("merge: two comes from a program with 2 lanes"), "{message}");
+        let mut rounded = of(&["b"], &[]);
+        let had = rounded.environment.target_features.iter().any(|name| name == "fma");
+        rounded.environment.target_features = if had { Vec::new() } else { vec!["fma".into()] };
+        assert!(StudyFile::merged(vec![of(&["a"], &[]), rounded], &names).is_err());
         let mut other = of(&["b"], &[]);
         other.settings["seed"] = 9.into();
         let message = StudyFile::merged(vec![of(&["a"], &[]), other], &names).unwrap_err().to_string();

@@ -14,9 +14,9 @@ pub fn is_sweep(records: &[Record]) -> bool {
 }
 
 const LEGEND: &str = "\
-A setting is good enough if the scene holds and its errors are within the tolerances of a plausible run (`simpulse list \
-SCENE` lists them with their reasons). Runs were not extended to a minute: later failures do not show. budget: substeps; \
-then velocity, relaxation and position sweeps per substep. µs/step: mean over the run, its longest step, ± median \
+A setting is good enough if the scene holds and its errors are within its tolerances (`simpulse list \
+SCENE` lists them with their reasons). Runs were not extended to a minute: later failures do not show. setting: substeps × the \
+velocity, relax and position sweeps in each. µs/step: mean over the run, its longest step, ± median \
 deviation of a repeat; all settings of a scene were timed interleaved. ns/contact: mean step ÷ mean number of contacts. \
 tables.txt has every column.";
 

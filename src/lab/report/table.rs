@@ -1,6 +1,6 @@
 //! Tables for a terminal of 160 columns.
 
-use super::units::{ratio, si};
+use super::units::{percent, si};
 use crate::lab::metrics::Errors;
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
@@ -40,12 +40,12 @@ pub(crate) fn finish(mut table: Table, left: usize) -> String {
 pub fn error_line(errors: Option<&Errors>) -> String {
     match errors {
         Some(e) => format!(
-            "errors of the last {} steps: penetration {} maximum, {} mean; law residual {} of the scene's weight, {} of a body's\n",
+            "errors of the last {} steps: overlap {} maximum, {} mean; force error {} of the scene's weight, {} of a body's\n",
             e.steps,
             si(e.penetration_max(), "m"),
             si(e.penetration_mean(), "m"),
-            ratio(e.get("residual_rms_scene_weights").unwrap_or_default()),
-            ratio(e.law_rms_body())
+            percent(e.get("residual_rms_scene_weights").unwrap_or_default()),
+            percent(e.law_rms_body())
         ),
         None => "errors: none observed, since no step was taken\n".to_string(),
     }

@@ -23,6 +23,7 @@ pub mod holds;
 mod incline;
 mod joints;
 mod junkyard;
+pub mod kind;
 mod linked;
 mod machines;
 mod mass_ratio;
@@ -252,6 +253,11 @@ fn entry_of(name: &str) -> Result<(&'static Entry, u32), Error> {
         return Err(Error::unknown("scene", stem, CATALOG.iter().map(|e| e.name)));
     };
     Ok((entry, entry.parse_size(size)?))
+}
+
+/// Whether a scene of the catalog has a random element.
+pub fn is_seeded(name: &str) -> bool {
+    entry_of(name).is_ok_and(|(entry, _)| entry.seeded.is_some())
 }
 
 /// As [`load`], for a run of this number of steps and step length `dt` (s), if given. The reference value is the one

@@ -52,9 +52,9 @@ impl Accuracy {
     /// Word for tables.
     pub fn word(self) -> &'static str {
         match self {
-            Accuracy::Plausible => "plausible",
-            Accuracy::Tight => "tight",
-            Accuracy::Exact => "exact",
+            Accuracy::Plausible => "good enough",
+            Accuracy::Tight => "10 × tighter",
+            Accuracy::Exact => "100 × tighter",
         }
     }
 

@@ -6,6 +6,7 @@ use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::{VARIANTS, Variant};
 use crate::lab::error::Error;
 use crate::lab::overrides;
+use crate::lab::units;
 
 /// Upper limit of every field of a budget, so that a typo does not run for a year.
 pub const LARGEST: u32 = 10_000;
@@ -127,26 +128,38 @@ pub fn check(budget: &Budget, variant: &Variant) -> Result<(), Error> {
     Ok(())
 }
 
-/// Short text of a budget, with the fields that `variant` uses: `4 sub · 1 vel · 1 rel`.
+/// Text of a budget, with the sweeps that `variant` makes: `4 substeps × (1 velocity + 1 relax)`.
 pub fn brief(budget: &Budget, variant: &Variant) -> String {
-    let mut text = format!("{} sub", budget.substeps);
-    for (name, count) in kinds(budget, variant) {
-        text += &format!(" {count} {}", &name[..3]);
+    let substeps = units::count(budget.substeps as usize, "substep");
+    let sweeps: Vec<String> = kinds(budget, variant).map(|(name, count)| format!("{count} {name}")).collect();
+    match &sweeps[..] {
+        [] => substeps,
+        [only] => format!("{substeps} × {only}"),
+        several => format!("{substeps} × ({})", several.join(" + ")),
     }
-    text
+}
+
+/// The numbers of [`brief`] alone: `4 × (1+1)`.
+pub fn numbers(budget: &Budget, variant: &Variant) -> String {
+    let sweeps: Vec<String> = kinds(budget, variant).map(|(_, count)| count.to_string()).collect();
+    match &sweeps[..] {
+        [] => budget.substeps.to_string(),
+        [only] => format!("{} × {only}", budget.substeps),
+        several => format!("{} × ({})", budget.substeps, several.join("+")),
+    }
 }
 
 /// Appends the treatment of impacts and of frozen contacts, unless they are the solver's own.
 pub fn with_treatments(text: String, impacts: Impacts, frozen: Freezing) -> String {
     let text = match impacts {
         Impacts::Own => text,
-        Impacts::Waves => text + " waves",
-        Impacts::None => text + " no impacts",
+        Impacts::Waves => text + ", impacts in waves",
+        Impacts::None => text + ", no impacts",
     };
     match frozen {
         Freezing::Own => text,
-        Freezing::Off => text + " fresh",
-        Freezing::Within(_) => format!("{text} frozen {frozen}"),
+        Freezing::Off => text + ", fresh contacts",
+        Freezing::Within(_) => format!("{text}, frozen {frozen}"),
     }
 }
 
@@ -159,7 +172,7 @@ pub fn whole(
 ) -> String {
     let text = with_treatments(brief(budget, variant), treatments.0, treatments.1);
     let parameters = overrides::brief(variant, own);
-    if parameters.is_empty() { text } else { format!("{text} {parameters}") }
+    if parameters.is_empty() { text } else { format!("{text}, {parameters}") }
 }
 
 #[cfg(test)]

@@ -12,8 +12,8 @@ pub enum ErrorAxis {
     /// The penetration as defined by [`Errors::penetration`](crate::lab::metrics::Errors::penetration): the
     /// visible error.
     Penetration,
-    /// The contact-law residual: root mean square, relative to the weight of the lighter body. The
-    /// mathematical error.
+    /// The force error, that is the residual of the contact law: root mean square, relative to the weight of the lighter
+    /// body. The mathematical error.
     Law,
     /// The distance to the reference value: the physical error.
     Truth,
@@ -42,8 +42,8 @@ impl ErrorAxis {
     /// Name for headings.
     pub fn name(self) -> &'static str {
         match self {
-            ErrorAxis::Penetration => "penetration",
-            ErrorAxis::Law => "contact-law residual",
+            ErrorAxis::Penetration => "overlap",
+            ErrorAxis::Law => "force error",
             ErrorAxis::Truth => "distance to reference value",
             ErrorAxis::Rest => "speed at rest",
         }
@@ -52,8 +52,8 @@ impl ErrorAxis {
     /// Name for tables.
     pub fn word(self) -> &'static str {
         match self {
-            ErrorAxis::Penetration => "penetration",
-            ErrorAxis::Law => "residual",
+            ErrorAxis::Penetration => "overlap",
+            ErrorAxis::Law => "force error",
             ErrorAxis::Truth => "reference",
             ErrorAxis::Rest => "rest speed",
         }
@@ -74,11 +74,11 @@ impl ErrorAxis {
         }
     }
 
-    /// The unit of this error in the records of a scene.
+    /// The unit in which this error is shown; `%` of values that are fractions.
     pub fn unit(self, records: &[Record]) -> &'static str {
         match self {
             ErrorAxis::Penetration => "m",
-            ErrorAxis::Law => "",
+            ErrorAxis::Law => "%",
             ErrorAxis::Rest => "m/s",
             ErrorAxis::Truth => records.iter().find_map(|r| r.truth).map_or("", |t| t.unit),
         }

@@ -7,6 +7,7 @@ use crate::engine::constraints::Impacts;
 use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::{Variant, find};
 use crate::lab::error::Error;
+use crate::lab::study::plan::seed_of;
 use crate::lab::overrides;
 use serde::{Deserialize, Serialize};
 use std::sync::{Arc, LazyLock};
@@ -83,6 +84,8 @@ impl Found {
     /// Settings found for a solver on a scene with this treatment of impacts, or else with the solver's own.
     /// `None` if the list has neither.
     pub fn of(&self, scene: &str, solver: &Variant, impacts: Impacts) -> Option<Vec<TunedBudget>> {
+        // All members of an ensemble have the settings of the scene.
+        let scene = seed_of(scene).map_or(scene, |(whole, _)| whole);
         let with = |impacts: Impacts| {
             let is = |e: &&FoundSetting| e.scene == scene && e.solver == solver.name && e.impacts == impacts;
             let settings: Vec<_> = self.entries.iter().filter(is).filter_map(|e| e.tuned().ok()).collect();

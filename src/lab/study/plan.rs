@@ -4,6 +4,7 @@ use super::budget::{self, BudgetGrid};
 use super::found::{Found, TunedBudget};
 use super::sweep::{QuantitySweep, Swept};
 use super::{DEFAULT_SCENES, default_solvers, horizon};
+use crate::engine::bodies::BodyKind;
 use crate::engine::constraints::Impacts;
 use crate::engine::lanes::{LaneWidth, native_width};
 use crate::engine::narrowphase::frozen::Freezing;
@@ -18,6 +19,8 @@ use crate::lab::scenes::holds::Demand;
 use crate::lab::scenes::tolerance::{GivenTolerances, Tolerance, Tolerances};
 use crate::lab::scenes::{self, Loaded, Scene};
 use crate::lab::units::si;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 use std::sync::Arc;
 
 /// Everything that a study runs.
@@ -350,7 +353,8 @@ pub fn is_path(name: &str) -> bool {
     name.ends_with(".json") || name.contains(['/', '\\'])
 }
 
-/// Opens a scene of the catalog or of a file (a name with a separator, or one that ends in `.json`). The
+/// Opens a scene of the catalog or of a file (a name with a separator, or one that ends in `.json`), or a member of an
+/// [ensemble](seed_of). The
 /// number of steps and their length `dt` (s) can be overridden. The reference value is then the one for that
 /// run.
 pub fn open_scene(
@@ -359,6 +363,14 @@ pub fn open_scene(
     steps: Option<u32>,
     dt: Option<f64>,
 ) -> Result<Loaded, Error> {
+    if let Some((whole, own)) = seed_of(name) {
+        let mut loaded = open_scene(whole, Some(own), steps, dt)?;
+        if !scenes::is_seeded(whole) {
+            disturb(&mut loaded.scene, own);
+        }
+        loaded.scene.name += &format!("@{own}");
+        return Ok(loaded);
+    }
     if is_path(name) {
         let mut scene = Scene::from_file(name)?;
         scene.steps = steps.unwrap_or(scene.steps);
@@ -369,9 +381,46 @@ pub fn open_scene(
     scenes::load_run(name, seed, steps, dt)
 }
 
+/// Name and seed of a member of an ensemble, `arch@3`: a scene from a seed. Scenes without a random element differ by
+/// the velocities with which bodies start, see [`DISTURBANCE`].
+pub fn seed_of(name: &str) -> Option<(&str, u64)> {
+    let (whole, seed) = name.rsplit_once('@')?;
+    Some((whole, seed.parse().ok()?))
+}
+
+/// Largest speed that a seed gives to a body of a scene without a random element, in length units per second: a fifth
+/// of what is visible.
+const DISTURBANCE: f64 = 1e-3;
+
+/// Gives each dynamic body a random velocity in addition to its own.
+fn disturb(scene: &mut Scene, seed: u64) {
+    let mut random = Pcg64Mcg::seed_from_u64(seed);
+    let limit = DISTURBANCE * scene.length_unit;
+    for body in scene.bodies.iter_mut().filter(|body| body.kind == BodyKind::Dynamic) {
+        for value in &mut body.velocity {
+            *value += random.random_range(-limit..=limit);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_seed_moves_every_dynamic_body_a_little_or_makes_another_scene() {
+        let open = |name: &str| open_scene(name, None, None, None).unwrap().scene;
+        let (plain, one, two) = (open("stack:3"), open("stack:3@1"), open("stack:3@2"));
+        assert_eq!((one.name.as_str(), one.bodies.len()), ("stack:3@1", plain.bodies.len()));
+        for ((a, b), c) in one.bodies.iter().zip(&two.bodies).zip(&plain.bodies) {
+            let moves = a.kind == BodyKind::Dynamic;
+            assert_eq!((a.velocity != c.velocity, a.velocity != b.velocity, a.position), (moves, moves, c.position));
+            assert!(a.velocity.iter().all(|v| v.abs() <= DISTURBANCE));
+        }
+        assert_ne!(open("circle_pile:9@1").bodies[3].position, open("circle_pile:9@2").bodies[3].position);
+        assert_eq!(open("circle_pile:9@1").bodies[3].velocity, open("circle_pile:9").bodies[3].velocity);
+        assert!(open_scene("stack:3@x", None, None, None).is_err() && seed_of("a@b@7") == Some(("a@b", 7)));
+    }
 
     #[test]
     fn wide_lanes_run_by_themselves_where_they_are_native() {

@@ -7,15 +7,14 @@
 //! fastest, not in the score.
 //!
 //! The choice of scenes and tolerances is arbitrary. Every score therefore has a range: over all studies with
-//! one scene or one [class](SceneClass) of scenes left out, and with half or twice the tolerances, at which
+//! one scene or one [class](crate::lab::scenes::class::SceneClass) of scenes left out, and with half or twice the tolerances, at which
 //! settings were [searched](super::search) as well. Only a solver that is first in all of them
-//! [leads](Ranking::leader), by more than a negligible difference of time. The same holds within a class.
+//! [leads](Ranking::leader), by more than a negligible difference of time.
 
 use super::Record;
 use super::compare::TIE;
 use super::curve::{distinct, solvers_of};
 use super::profile::times_of_fastest;
-use crate::lab::scenes::class::SceneClass;
 use crate::lab::scenes::tolerance::Accuracy;
 
 /// Result of a solver over all scenes.
@@ -27,8 +26,6 @@ pub struct Standing {
     pub score: f64,
     /// Smallest and largest score with one scene or class left out, or with other tolerances.
     pub range: [f64; 2],
-    /// Mean speed on the scenes of each class; `None` without any.
-    pub by_class: [Option<f64>; 3],
     /// Number of scenes on which some setting holds and meets all tolerances, at each accuracy.
     pub good: [usize; 3],
     /// Number of scenes, for plausible runs, on which it is the fastest solver or ties with it.
@@ -45,8 +42,6 @@ pub struct Ranking {
     /// Solvers that are first in some variation: with no scene, any scene or any class left out, or with half or twice
     /// the tolerances.
     pub first: FirstPlaces,
-    /// The same on the scenes of each class alone.
-    pub first_in: [FirstPlaces; 3],
 }
 
 /// First places of solvers in variations of a ranking; solvers may share one.
@@ -107,8 +102,6 @@ pub fn ranking(records: &[Record]) -> Ranking {
         records.chunk_by(|a, b| a.scene == b.scene).map(|scene| (scene, by_factor(scene))).collect();
     let all: Vec<&SceneSpeeds> = scenes.iter().collect();
     let tried = variations(&all);
-    let of_class = |class| scenes.iter().filter(move |s| s.0[0].class == class).collect::<Vec<_>>();
-    let tried_in = SceneClass::ALL.map(|class| variations(&of_class(class)));
     let standing = |(k, &solver): (usize, &&'static str)| {
         let good = |accuracy: Accuracy| {
             let is_good = |s: &&SceneSpeeds| s.0.iter().any(|r| r.solver == solver && r.is_good(accuracy));
@@ -121,7 +114,6 @@ pub fn ranking(records: &[Record]) -> Ranking {
             solver,
             score: tried[0][k],
             range: [least, most],
-            by_class: tried_in.each_ref().map(|tried| Some(tried.first()?[k])),
             good: Accuracy::ALL.map(good),
             fastest: scenes.iter().filter(|s| s.1[0][k].1).count(),
             fails_on: failing.map(|s| s.0[0].scene.clone()).collect(),
@@ -139,13 +131,13 @@ pub fn ranking(records: &[Record]) -> Ranking {
         solvers.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
         FirstPlaces { solvers, variations: tried.len() }
     };
-    let (first, first_in) = (places(&tried), tried_in.each_ref().map(places));
-    Ranking { standings, first, first_in }
+    Ranking { first: places(&tried), standings }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lab::scenes::class::SceneClass;
     use crate::lab::study::record::tests::{failed, fell, record};
 
     fn on(scene: &str, solver: &'static str, time: f64, error: f64) -> Record {
@@ -174,7 +166,7 @@ mod tests {
         let tied = 1.0 / ((1e3 * 10.1) / (1e3 * 10.0));
         assert_eq!((b.solver, b.score, b.good), ("b", (1.0 + tied) / 4.0, [2, 2, 0]));
         assert_eq!((a.solver, a.score, a.good), ("a", 1.25 / 4.0, [2, 2, 1]));
-        assert_eq!((b.fastest, a.fastest, a.by_class), (2, 1, [None, None, Some(1.25 / 4.0)]));
+        assert_eq!((b.fastest, a.fastest), (2, 1));
         assert_eq!(a.fails_on, ["z", "w"]);
         // Without x b scores a third of its tie, without z or w two thirds.
         assert_eq!((b.range, a.range), ([tied / 3.0, (1.0 + tied) / 3.0], [0.25 / 3.0, 1.25 / 3.0]));
@@ -215,11 +207,7 @@ mod tests {
         ];
         let found = ranking(records.as_flattened());
         // No single scene decides, but without those that are placed b is first.
-        let [places, placed, arrives, moves] =
-            [&found.first, &found.first_in[0], &found.first_in[1], &found.first_in[2]]
-                .map(|first| &first.solvers[..]);
-        assert_eq!((found.standings[0].solver, places), ("a", &[("a", 8), ("b", 1)][..]));
-        assert_eq!((placed, arrives, moves), (&[("a", 6)][..], &[][..], &[("b", 3)][..]));
+        assert_eq!((found.standings[0].solver, &found.first.solvers[..]), ("a", &[("a", 8), ("b", 1)][..]));
     }
 
     #[test]

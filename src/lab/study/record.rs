@@ -19,7 +19,7 @@ use crate::lab::scenes::class::SceneClass;
 use crate::lab::scenes::holds::{Broken, Mark};
 use crate::lab::scenes::tolerance::{Accuracy, Tolerances};
 pub use crate::lab::trial::TruthError;
-use crate::lab::units::si;
+use crate::lab::units::{self, si};
 
 /// One row of the study: a scene, a solver, a budget, an order and a lane width.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
@@ -157,6 +157,11 @@ impl Record {
         }
     }
 
+    /// The setting in words: `4 substeps × 8 velocity, 8 lanes`.
+    pub fn setting_text(&self) -> String {
+        format!("{}, {}", self.budget_text, units::lanes_or_order(self.order, self.lanes))
+    }
+
     /// Key that all widths of one setting of a scene share.
     pub fn setting(&self) -> impl PartialEq {
         let chosen = (self.budget, self.order, self.impacts, self.frozen, self.parameters.as_str());
@@ -221,7 +226,7 @@ impl Record {
         let mut text = format!("simpulse run {} --solver {}", quoted(scene), self.solver);
         text += &match self.order {
             Order::Colored => format!(" --lanes {}", self.lanes),
-            order => format!(" --order {}", order.name()),
+            order => format!(" --order {}", units::order(order)),
         };
         text += &format!(" --substeps {}", self.budget.substeps);
         if let Ok(solver) = find(self.solver) {
@@ -366,7 +371,7 @@ pub(crate) mod tests {
             order: Order::Colored,
             lanes,
             budget: Budget { substeps, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
-            budget_text: format!("{substeps} sub"),
+            budget_text: format!("{substeps} substeps"),
             impacts: Impacts::Own,
             frozen: Freezing::Own,
             parameters: String::new(),

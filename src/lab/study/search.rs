@@ -71,7 +71,7 @@ pub fn rule() -> String {
     let list = |values: &[u32]| values.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
     format!(
         "substeps {} × sweeps {} (at most {MOST_SWEEPS} in a step) × stiffness, at most {MOST} settings for each solver and scene, \
-         in colored order, by successive halving on errors; timed are those of least work at 2, 1, 0.5, 0.1 and 0.01 times the tolerances",
+         in parallel order, by successive halving on errors; timed are those of least work at 2, 1, 0.5, 0.1 and 0.01 times the tolerances",
         list(&SUBSTEPS),
         list(&SWEEPS)
     )

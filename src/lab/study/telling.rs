@@ -7,7 +7,6 @@ use crate::engine::world::{Order, Settings};
 use crate::lab::error::Error;
 use crate::lab::recording::record::{Caption, record_trial};
 use crate::lab::trial::Trial;
-use crate::lab::units::lanes;
 use std::cmp::Reverse;
 
 /// Maximum number of runs shown side by side.
@@ -69,7 +68,7 @@ fn recording(plan: &StudyPlan, record: &Record) -> Result<Vec<u8>, Error> {
     let Some(mut loaded) = opened.find(|loaded| loaded.scene.name == record.scene) else {
         return Err(Error::invalid("replay", format!("no run of {} on {}", record.solver, record.scene)));
     };
-    let setting = format!("{}, {}", record.budget_text, lanes(record.lanes));
+    let setting = record.setting_text();
     let caption = Caption { scene: record.scene.clone(), solver: record.solver.into(), setting };
     let every = loaded.scene.steps.div_ceil(FRAMES);
     let trial = Trial::of(&mut loaded, Settings { record_impulses: true, ..record.settings()? });
@@ -108,6 +107,6 @@ mod tests {
         let files = recordings(&plan, &[record(4, 1, 1.0, 1e-3)]).unwrap();
         let found = read(&files[0]).unwrap();
         assert_eq!((found.header.solver.as_str(), found.frames.len()), ("pgs", 21));
-        assert_eq!(found.header.setting, "1 sub, 4 lanes");
+        assert_eq!(found.header.setting, "1 substeps, 4 lanes");
     }
 }

@@ -11,7 +11,7 @@ use crate::lab::scenes::Loaded;
 use crate::lab::scenes::holds::SceneMonitor;
 use crate::lab::study::curve::ErrorAxis;
 use crate::lab::study::{FailedAt, Record, TruthError, budget};
-use crate::lab::units::{digits, si};
+use crate::lab::units::{percent, si};
 
 /// Errors of one step: overlap (m), force error (weights of the lighter body × step), speed (m/s).
 pub type StepErrors = [f64; 3];
@@ -217,7 +217,6 @@ impl Pane {
 
 /// `overlap 18.2 mm > 10.0 mm`
 fn exceeded(axis: ErrorAxis, error: f64, limit: f64, record: &Record) -> String {
-    let percent = |x: f64| format!("{} %", digits(100.0 * x));
     match axis {
         ErrorAxis::Penetration => format!("overlap {} > {}", si(error, "m"), si(limit, "m")),
         ErrorAxis::Law => format!("force error {} > {} of a body's weight", percent(error), percent(limit)),

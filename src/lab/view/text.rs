@@ -14,7 +14,6 @@ use crate::lab::overrides::decimal;
 use crate::lab::recording::record::{self, Caption};
 use crate::lab::report::style::Style;
 use crate::lab::study::budget;
-use crate::lab::units::lanes;
 use serde_json::{Value, json};
 
 /// Description of a pane for a recording.
@@ -23,7 +22,7 @@ pub(super) fn caption(source: &Source, pane: &Pane) -> Caption {
     Caption {
         scene: source.name.clone(),
         solver: record.solver.into(),
-        setting: format!("{}, {}", record.budget_text, lanes(record.lanes)),
+        setting: record.setting_text(),
     }
 }
 

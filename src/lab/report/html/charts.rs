@@ -2,20 +2,22 @@
 
 use crate::lab::chart::scale::number;
 use crate::lab::chart::{Axis, Chart, ChartMark, FailStrip, LineStyle, Scale, Series, Style};
-use crate::lab::report::by_scene::{self, setting};
+use crate::engine::solvers::find;
+use crate::lab::report::by_scene;
 use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, distinct, solvers_of};
 use crate::lab::study::profile::Profile;
 use crate::lab::study::search::LEVELS;
 use crate::lab::study::sweep::Swept;
 use crate::lab::study::{Record, answer};
-use crate::lab::units::si;
+use crate::lab::study::budget;
+use crate::lab::units::{percent, si};
 
 /// The records of each scene.
 pub fn scenes(records: &[Record]) -> Vec<&[Record]> {
     records.chunk_by(|a, b| a.scene == b.scene).collect()
 }
 
-/// The middle one of a solver's settings; of those in colored order if there are any.
+/// The middle one of a solver's settings; of those in parallel order if there are any.
 pub fn standard<'a>(scene: &'a [Record], solver: &str) -> Option<&'a Record> {
     let own: Vec<&Record> = answer::each_setting(scene).into_iter().filter(|r| r.solver == solver).collect();
     let colored: Vec<&Record> = own.iter().copied().filter(|r| !r.order.is_serial()).collect();
@@ -33,16 +35,18 @@ fn drawn(record: &Record, axis: ErrorAxis) -> Option<f64> {
     axis.of(record).filter(|_| record.holds()).map(|error| error.max(ERROR_FLOOR))
 }
 
-/// Budget, and order or lane width, abbreviated: `7·1·1@8`.
-pub fn short_words(record: &Record) -> String {
-    let numbers: Vec<&str> = record.budget_text.split(' ').filter(|w| w.parse::<u32>().is_ok()).collect();
-    let width = if record.order.is_serial() { "nat".into() } else { record.lanes.to_string() };
-    format!("{}@{width}", numbers.join("·"))
+/// The numbers of a budget: `7 × (1+1)`.
+fn short_words(record: &Record) -> String {
+    find(record.solver).map_or(String::new(), |solver| budget::numbers(&record.budget, solver))
 }
 
 /// An error with its unit.
 fn shown(error: f64, unit: &str) -> String {
-    if unit.is_empty() || unit == "1" { number(error) } else { si(error, unit) }
+    match unit {
+        "" | "1" => number(error),
+        "%" => percent(error),
+        unit => si(error, unit),
+    }
 }
 
 /// Lower and upper quartile of the time of a step (s).
@@ -67,6 +71,24 @@ fn name(scene: &[Record], axis: ErrorAxis) -> Option<(String, &'static str)> {
         }
         axis => Some((axis.name().to_string(), axis.unit(scene))),
     }
+}
+
+/// Every chart of a study that a paper may show, with a name for a file.
+pub fn figures(records: &[Record]) -> Vec<(String, Chart)> {
+    let named = |scene: &str, charts: Vec<Chart>| -> Vec<(String, Chart)> {
+        let safe: String = scene.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+        charts.into_iter().enumerate().map(|(i, chart)| (format!("{safe}-{}", i + 1), chart)).collect()
+    };
+    let swept = records.iter().find_map(|r| r.swept);
+    let mut all = Vec::new();
+    if swept.is_none() {
+        all.extend(overview(records).map(|chart| ("overview".to_string(), chart)));
+        all.extend(named("profile", profiles(records)));
+    }
+    for scene in scenes(records) {
+        all.extend(named(&scene[0].scene, swept.map_or_else(|| precision(scene), |swept| sweep(scene, swept))));
+    }
+    all
 }
 
 /// Time against each error of a scene.
@@ -106,7 +128,7 @@ fn precision_chart(
             let own = settings.iter().filter(|r| r.solver == solver && of(r) == kind);
             let mark = |(i, r): (usize, &&Record)| {
                 let (time, value) = (time(r)?, drawn(r, error));
-                let what = format!("{solver}, {}: {}", setting(r), si(time, "s"));
+                let what = format!("{solver}, {}: {}", r.setting_text(), si(time, "s"));
                 let error = value.map_or(String::new(), |value| shown(value, unit));
                 let mark = mark(r, [value, Some(time)], 3.2 + 0.9 * i.min(4) as f64, what, error);
                 let label = if on_front(r) { short_words(r) } else { String::new() };
@@ -127,20 +149,21 @@ const DRAWN: [f64; 2] = [1e-3, 1e4];
 
 /// Time relative to the fastest setting that holds against the largest error ÷ tolerance, over all scenes: a small mark
 /// per setting and scene, a large one for the geometric mean of a solver's cheapest settings within each of the
-/// [`LEVELS`] of the tolerances. `None` if nothing holds.
+/// [`LEVELS`] of the tolerances. Large marks count every setting, as the tables do. `None` if nothing holds.
 pub fn overview(records: &[Record]) -> Option<Chart> {
     let wrong = |r: &Record| Some(r.excess()).filter(|x| x.is_finite()).map(|x| x.clamp(DRAWN[0], DRAWN[1]));
-    // The record, and its time relative to the fastest.
-    let mut dots: Vec<(&Record, f64)> = Vec::new();
+    // The record, its time relative to the fastest, and whether it has a small mark: in parallel order, with the first
+    // treatment of contacts, since others do not exist on every scene.
+    let mut dots: Vec<(&Record, f64, bool)> = Vec::new();
     for scene in scenes(records) {
-        let settings: Vec<&Record> =
-            answer::each_setting(scene).into_iter().filter(|r| !r.order.is_serial()).collect();
+        let settings = answer::each_setting(scene);
         let least =
             settings.iter().filter(|r| r.holds()).filter_map(|r| time(r)).fold(f64::INFINITY, f64::min);
-        // Other treatments of contacts are separate runs that do not exist on every scene.
-        let first = |r: &&&Record| (r.impacts, r.frozen) == (scene[0].impacts, scene[0].frozen);
-        let own = settings.iter().filter(first).filter(|_| least.is_finite());
-        dots.extend(own.filter_map(|r| Some((*r, time(r)? / least))));
+        let small = |r: &Record| {
+            !r.order.is_serial() && (r.impacts, r.frozen) == (scene[0].impacts, scene[0].frozen)
+        };
+        let timed = settings.into_iter().filter(|_| least.is_finite());
+        dots.extend(timed.filter_map(|r| Some((r, time(r)? / least, small(r)))));
     }
     if dots.is_empty() {
         return None;
@@ -148,8 +171,8 @@ pub fn overview(records: &[Record]) -> Option<Chart> {
     let (mut settings, mut means) = (Vec::new(), Vec::new());
     for solver in solvers_of(records) {
         let own = || dots.iter().filter(|d| d.0.solver == solver);
-        let small = own().map(|(r, slower)| {
-            let what = format!("{solver} on {}: {}, {}× the fastest", r.scene, setting(r), number(*slower));
+        let small = own().filter(|d| d.2).map(|(r, slower, _)| {
+            let what = format!("{solver} on {}: {}, {}× the fastest", r.scene, r.setting_text(), number(*slower));
             let error = wrong(r).map_or(String::new(), |x| format!("error {} × tolerance", number(x)));
             mark(r, [wrong(r), Some(*slower)], 2.6, what, error)
         });
@@ -158,7 +181,7 @@ pub fn overview(records: &[Record]) -> Option<Chart> {
         for level in LEVELS {
             let cheapest = |scene: &[Record]| {
                 let within = own().filter(|d| d.0.scene == scene[0].scene && d.0.excess_at(level) <= 1.0);
-                let (record, slower) = within.min_by(|a, b| a.1.total_cmp(&b.1))?;
+                let (record, slower, _) = within.min_by(|a, b| a.1.total_cmp(&b.1))?;
                 Some([wrong(record)?, *slower])
             };
             let met: Vec<[f64; 2]> = scenes(records).into_iter().filter_map(cheapest).collect();
@@ -169,11 +192,7 @@ pub fn overview(records: &[Record]) -> Option<Chart> {
                 number(mean(0)),
                 number(mean(1))
             );
-            let label = match (level == 1.0, count == of) {
-                (false, _) => String::new(),
-                (_, true) => solver.to_string(),
-                (_, false) => format!("{solver}, fails on {} of {of}", of - count),
-            };
+            let label = if level == 1.0 { format!("{solver}, {count} of {of}") } else { String::new() };
             let mark = ChartMark::at(mean(0), mean(1), 5.5 + 1.2 * large.len() as f64, title);
             large.extend((count > 0).then_some(ChartMark { hollow: count < of, label, ..mark }));
         }
@@ -228,7 +247,7 @@ fn curves<'a>(
     let series = |solver: &'static str| {
         let mark = |r: &Record| {
             let ([x, y], shown) = place(r)?;
-            Some(mark(r, [Some(x), Some(y)], 3.5, format!("{solver}, {}", setting(r)), shown))
+            Some(mark(r, [Some(x), Some(y)], 3.5, format!("{solver}, {}", r.setting_text()), shown))
         };
         Series::line(Style::of(solver), of_solver(solver).into_iter().filter_map(mark).collect())
     };
@@ -263,7 +282,7 @@ pub fn over_lanes(records: &[Record]) -> Vec<Chart> {
     charts
 }
 
-/// Sweeps of a step over the constraints against penetration and residual; two charts per scene.
+/// Sweeps of a step over the constraints against overlap and force error; two charts per scene.
 pub fn iterations(records: &[Record]) -> Vec<Chart> {
     let chart = |scene: &[Record], error: ErrorAxis| {
         let unit = error.unit(scene);
@@ -310,7 +329,7 @@ fn sweep_chart(scene: &[Record], swept: Swept, error: Option<ErrorAxis>, unit: &
         let mut own: Vec<&&Record> = settings.iter().filter(is_own).collect();
         own.sort_by(|a, b| at(a).total_cmp(&at(b)));
         let mark = |r: &&&Record| {
-            let what = format!("{solver}, {} {} {}, {}", swept.name, number(at(r)), swept.unit, setting(r));
+            let what = format!("{solver}, {} {} {}, {}", swept.name, number(at(r)), swept.unit, r.setting_text());
             let y = value(r);
             let text = y.map_or(String::new(), |y| if unit == "s" { si(y, "s") } else { shown(y, unit) });
             let bar = quartiles(r).filter(|_| error.is_none() && !is_dt);
@@ -349,7 +368,7 @@ mod tests {
             at(1.0, record(8, 1, 11.0, 1e-3)),
         ];
         let made = sweep(&records, records[0].swept.unwrap());
-        // Time, penetration and residual; there is no reference value.
+        // Time, overlap and force error; there is no reference value.
         assert_eq!(made.len(), 3);
         for svg in made.iter().map(Chart::svg) {
             assert_eq!(svg.matches("<title>pgs").count(), 5, "{svg}");

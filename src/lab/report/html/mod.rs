@@ -11,8 +11,9 @@ mod matrix;
 
 use super::doc::{self, DocBlock, DocCell, DocTable, Tone};
 use super::style::Style;
-use super::{answer, by_scene, sweep};
+use super::{answer, by_scene, ensemble, sweep};
 use crate::engine::clock::Phase;
+use crate::lab::chart::figure::FigureStyle;
 use crate::lab::chart::{THEME, legend};
 use crate::lab::error::Error;
 use crate::lab::files;
@@ -59,14 +60,29 @@ pub fn write_recordings(folder: &Path, recordings: &[Vec<u8>]) -> Result<Vec<Pat
 pub fn write(folder: &Path, study: &StudyFile) -> Result<PathBuf, Error> {
     let matrix_path = folder.join("verify.json");
     let matrix: Option<VerifyFile> = if matrix_path.exists() { Some(read_json(&matrix_path)?) } else { None };
-    let mut recordings = Vec::new();
-    for path in (0..MOST).map(|i| folder.join(recording_name(i))).filter(|p| p.exists()) {
-        let (bytes, recording) = read_file(&path)?;
-        recordings.push((bytes, recording.header));
-    }
+    let recordings = recordings_of(folder)?;
     let path = folder.join(NAME);
     files::write(&path, page(study, matrix.as_ref(), &recordings).as_bytes())?;
     Ok(path)
+}
+
+/// Writes every chart of a study into `figures` in its folder; returns their paths.
+pub fn write_figures(folder: &Path, records: &[Record], style: &FigureStyle) -> Result<Vec<PathBuf>, Error> {
+    let folder = folder.join("figures");
+    files::prepare_folder(&folder)?;
+    let names: Vec<(&str, Style)> = solvers_of(records).into_iter().map(|name| (name, Style::of(name))).collect();
+    let write = |(name, chart)| {
+        let path = folder.join(format!("{name}.svg"));
+        files::write(&path, style.svg(&chart, &names).as_bytes()).map(|()| path)
+    };
+    charts::figures(records).into_iter().map(write).collect()
+}
+
+/// The recordings in a study's folder, with their headers. Errors: an invalid file.
+pub fn recordings_of(folder: &Path) -> Result<Vec<(Vec<u8>, Header)>, Error> {
+    let paths = (0..MOST).map(|i| folder.join(recording_name(i))).filter(|path| path.exists());
+    let read = |path: PathBuf| read_file(&path).map(|(bytes, recording)| (bytes, recording.header));
+    paths.map(read).collect()
 }
 
 fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, Error> {
@@ -93,7 +109,7 @@ fn sections(
     let machine = ("machine", "Machine, settings and command", machine(study));
     if let Some(swept) = records.iter().find_map(|r| r.swept) {
         let lead = format!(
-            "Time and errors against {}, one curve per solver. A mark is a setting at its fastest lane width; hollow marks are in natural order. Bars are the quartiles of the blocks of steps. The shaded side is within the scene’s tolerance. Settings that fail are in the strip “fails” at the top and break the curve. The settings of a scene were timed interleaved.",
+            "Time and errors against {}, one curve per solver. A mark is a setting at its fastest lane width; hollow marks are in file order. Bars are the quartiles of the blocks of steps. The shaded side is within the scene’s tolerance. Settings that fail are in the strip “fails” at the top and break the curve. The settings of a scene were timed interleaved.",
             swept.name
         );
         let mut blocks = vec![plain(&lead), legend()];
@@ -107,11 +123,15 @@ fn sections(
         return vec![("sweep", "Sweep", blocks), machine];
     }
     let mut answer = answer::blocks(records, &study.environment, study.steps());
-    answer.push(plain(&study.budgets()));
+    answer.push(DocBlock::Text(Tone::Soft, study.budgets()));
+    // Below the table with the answer of each scene.
+    let first = answer.iter().position(|block| matches!(block, DocBlock::Table(_))).map_or(0, |i| i + 1);
+    answer.insert(first, DocBlock::Table(by_scene::every_solver(records)));
+    answer.insert(first, DocBlock::Table(ensemble::table(records)));
     let overview = match charts::overview(records) {
         Some(chart) => vec![
             plain(
-                "Small marks: every solver and budget on every scene, in colored order, at its fastest lane width. Large marks: a solver’s cheapest settings within 2, 1, 0.5, 0.1 and 0.01 times the tolerances of each scene, the larger the stricter, geometric mean over scenes. Hollow ones omit scenes on which no setting is as good; names stand at 1 × and say on how many. Lower left is better; settings that fail are in the strip “fails” at the right.",
+                "Small marks: every setting on every scene, in parallel order, at its fastest lane width. Large marks: a solver’s cheapest settings within 2, 1, 0.5, 0.1 and 0.01 times the tolerances of each scene, the larger the stricter, geometric mean over scenes. Names stand at 1 × and say on how many scenes the solver is good enough; hollow marks omit the others. Lower left is better; settings that fail are in the strip “fails” at the right.",
             ),
             legend(),
             DocBlock::Charts("one", vec![chart]),
@@ -122,7 +142,7 @@ fn sections(
         vec![("answer", "The answer", answer), ("overview", "Speed against error over all scenes", overview)];
     if let Some((_, first)) = recordings.first() {
         let lead = format!(
-            "{} separates the solvers most, among scenes small enough to play. Bodies are colored by their deepest overlap; arrows are impulses.",
+            "{} is where the solvers differ most, among scenes small enough to play. Bodies are colored by their deepest overlap; arrows are impulses.",
             first.scene
         );
         let panel = |(bytes, header): &(Vec<u8>, Header)| RecordingPanel {
@@ -132,11 +152,11 @@ fn sections(
         };
         let panels: Vec<RecordingPanel> = recordings.iter().map(panel).collect();
         let player = DocBlock::Html(fragment(&panels, 0.6));
-        made.push(("replay", "Replay of the most telling scene", vec![plain(&lead), player]));
+        made.push(("replay", "Where the solvers differ most: a replay", vec![plain(&lead), player]));
     }
     let mut by_scenes = vec![
         plain(
-            "A mark is a setting at its fastest lane width; larger marks are larger budgets, hollow ones natural order. Beside those of the front stand budget (substeps · sweeps) and lanes. Bars are the quartiles of its blocks of steps. The gray line is the front: settings that no other beats in time and error. The shaded side is within the scene’s tolerance. What fails is at the right edge. Point at a mark for its numbers.",
+            "A mark is a setting at its fastest lane width; larger marks are larger budgets, hollow ones file order. Beside those of the front stands the budget, substeps × sweeps. Bars are the quartiles of its blocks of steps. The gray line is the front: settings that no other beats in time and error. The shaded side is within the scene’s tolerance. What fails is at the right edge. Point at a mark for its numbers.",
         ),
         legend(),
     ];
@@ -168,13 +188,13 @@ fn sections(
     }
     let lanes = charts::over_lanes(records);
     if !lanes.is_empty() {
-        let lead = "Each solver at the middle one of its budgets in colored order: speed-up over one lane, and the share of lanes that hold a contact.";
+        let lead = "Each solver at the middle one of its budgets in parallel order: speed-up over one lane, and the share of lanes that hold a contact.";
         made.push(("lanes", "Lanes", vec![plain(lead), legend(), DocBlock::Charts("four", lanes)]));
     }
-    let lead = "Each solver at the middle one of its budgets and its fastest lane width (budget@lanes): median time of each phase (µs), and its share.";
+    let lead = "Each solver at the middle one of its budgets and its fastest lane width: median time of each phase (µs), and its share.";
     let phases = std::iter::once(plain(lead)).chain(phases(records)).collect();
     made.push(("phases", "Time per phase", phases));
-    let lead = "Constraint sweeps per step, of every kind; settings that hold, in colored order.";
+    let lead = "Constraint sweeps per step, of every kind; settings that hold, in parallel order.";
     let iterations = DocBlock::Charts("four", charts::iterations(records));
     made.push(("iterations", "Iterations against error", vec![plain(lead), legend(), iterations]));
     let cases = match matrix {
@@ -209,7 +229,7 @@ fn phases(records: &[Record]) -> Vec<DocBlock> {
                 let time = if ns > 0.0 { digits(1e-3 * ns) } else { String::new() };
                 DocCell { css, title: format!("{share} %"), ..time.into() }
             };
-            let setting = DocCell::from(charts::short_words(record) + broken);
+            let setting = DocCell::from(record.setting_text() + broken);
             rows.row([DocCell::solver(record.solver), setting].into_iter().chain(used.iter().map(cell)));
         }
         DocBlock::Table(rows)
@@ -235,7 +255,8 @@ fn page(study: &StudyFile, matrix: Option<&VerifyFile>, recordings: &[(Vec<u8>, 
     let body = |(id, title, blocks): &Section| {
         format!("<section id=\"{id}\">\n<h2>{title}</h2>\n{}</section>\n", doc::html(blocks))
     };
-    let script = if recordings.is_empty() { String::new() } else { format!("<script>\n{SCRIPT}</script>\n") };
+    let player = if recordings.is_empty() { "" } else { SCRIPT };
+    let script = format!("<script>\n{}{player}</script>\n", include_str!("tables.js"));
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width\">\n<title>simpulse: contact solvers by speed and error\
@@ -325,7 +346,7 @@ mod tests {
         let page = page(&study, None, &[]);
         for part in [
             "PARTIAL: without arch",
-            "fails on",
+            "every solver on every scene",
             "fell at step 100",
             "blew up at step 7",
             "performance profiles",
