@@ -14,7 +14,7 @@
 use simpulse::engine::constraints::kernels::velocity::rules::{Rigid, Soft};
 use simpulse::engine::constraints::kernels::velocity::sweep::sweep;
 use simpulse::engine::constraints::{Kernel, NormalRule, Workspace};
-use simpulse::engine::lanes::LaneWidth;
+use simpulse::engine::lanes::{LaneWidth, Shared};
 use simpulse::engine::solvers;
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes;
@@ -69,9 +69,9 @@ fn sweep_once<R: NormalRule>(work: &mut Workspace, rule: R) {
     type Boxes = Kernel<true, true, 2>;
     let Workspace { rows, lanes, .. } = work;
     measured(&mut || match lanes.width() {
-        1 => sweep::<f32, Boxes, R>(rows, lanes, rule),
-        4 => sweep::<f32x4, Boxes, R>(rows, lanes, rule),
-        _ => sweep::<f32x8, Boxes, R>(rows, lanes, rule),
+        1 => sweep::<f32, Boxes, R>(Shared::from(&mut rows[..]), lanes, rule),
+        4 => sweep::<f32x4, Boxes, R>(Shared::from(&mut rows[..]), lanes, rule),
+        _ => sweep::<f32x8, Boxes, R>(Shared::from(&mut rows[..]), lanes, rule),
     });
 }
 

@@ -158,7 +158,13 @@ pub struct StudyArgs {
     #[arg(help_heading = "Output", long, value_name = "WIDTH[xHEIGHT]")]
     pub figure: Option<String>,
     /// Font of the figures
-    #[arg(help_heading = "Output", long, value_name = "NAME", default_value = "sans-serif", requires = "figure")]
+    #[arg(
+        help_heading = "Output",
+        long,
+        value_name = "NAME",
+        default_value = "sans-serif",
+        requires = "figure"
+    )]
     pub font: String,
     /// Size of the type in the figures (pt)
     #[arg(help_heading = "Output", long, value_name = "POINTS", default_value_t = 8.0, requires = "figure")]
@@ -261,7 +267,8 @@ impl FromStr for SeedRange {
     fn from_str(text: &str) -> Result<Self, String> {
         let found = text.split_once('-').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
         let found = found.filter(|(first, last)| first < last && last - first < MOST_SEEDS);
-        let (first, last) = found.ok_or_else(|| format!("'{text}' is not FIRST-LAST, for example 1-20, of at most 1000"))?;
+        let (first, last) =
+            found.ok_or_else(|| format!("'{text}' is not FIRST-LAST, for example 1-20, of at most 1000"))?;
         Ok(SeedRange { first, last })
     }
 }
@@ -269,7 +276,10 @@ impl FromStr for SeedRange {
 impl SeedRange {
     /// Each scene from each seed.
     fn of(self, scenes: &[String]) -> Vec<String> {
-        scenes.iter().flat_map(|name| (self.first..=self.last).map(move |seed| format!("{name}@{seed}"))).collect()
+        scenes
+            .iter()
+            .flat_map(|name| (self.first..=self.last).map(move |seed| format!("{name}@{seed}")))
+            .collect()
     }
 }
 
@@ -520,7 +530,11 @@ fn missing_parts(commands: &[String]) -> Vec<String> {
             return list;
         }
     }
-    commands.iter().filter(|command| !command.is_empty()).map(|command| format!("{command} --resume")).collect()
+    commands
+        .iter()
+        .filter(|command| !command.is_empty())
+        .map(|command| format!("{command} --resume"))
+        .collect()
 }
 
 /// Drops solvers that do not have the swept quantity, and returns a message about them.
@@ -589,7 +603,8 @@ mod tests {
         for bad in ["0/3", "4/3", "1", "a/b", "1/0", "-1/2", ""] {
             assert!(bad.parse::<Shard>().is_err_and(|e| e.contains(bad)), "{bad}");
         }
-        let commands = ["simpulse study --quick --shard 1/3 --out p1", "simpulse study --quick --shard=3/3 --out=p3"];
+        let commands =
+            ["simpulse study --quick --shard 1/3 --out p1", "simpulse study --quick --shard=3/3 --out=p3"];
         let commands = commands.map(String::from);
         assert_eq!(missing_parts(&commands), ["simpulse study --quick --shard 2/3 --out part-2"]);
         assert_eq!(missing_parts(&["simpulse study --out x".into()]), ["simpulse study --out x --resume"]);

@@ -301,6 +301,17 @@ mod tests {
         assert_eq!(sum.into_inner(), 120);
     }
 
+    /// More threads than processors, so that some come late to a task, or find it over.
+    #[test]
+    fn tasks_in_quick_succession_are_whole() {
+        let workers = with(8);
+        let mut parts = [0_u32; 8];
+        for round in 1..=20_000 {
+            workers.each(parts.iter_mut(), |part| *part += 1);
+            assert_eq!(parts, [round; 8]);
+        }
+    }
+
     #[test]
     fn a_panic_ends_the_task_alone_and_a_task_within_a_task_runs() {
         let workers = with(2);

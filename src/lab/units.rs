@@ -45,7 +45,8 @@ pub fn percent(fraction: f64) -> String {
         size => {
             let decimals = (1 - size.log10().floor() as i32).max(0) as usize;
             let text = format!("{value:.decimals$}");
-            let short = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+            let short =
+                if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
             format!("{short} %")
         }
     }

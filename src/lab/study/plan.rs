@@ -414,7 +414,10 @@ mod tests {
         assert_eq!((one.name.as_str(), one.bodies.len()), ("stack:3@1", plain.bodies.len()));
         for ((a, b), c) in one.bodies.iter().zip(&two.bodies).zip(&plain.bodies) {
             let moves = a.kind == BodyKind::Dynamic;
-            assert_eq!((a.velocity != c.velocity, a.velocity != b.velocity, a.position), (moves, moves, c.position));
+            assert_eq!(
+                (a.velocity != c.velocity, a.velocity != b.velocity, a.position),
+                (moves, moves, c.position)
+            );
             assert!(a.velocity.iter().all(|v| v.abs() <= DISTURBANCE));
         }
         assert_ne!(open("circle_pile:9@1").bodies[3].position, open("circle_pile:9@2").bodies[3].position);
