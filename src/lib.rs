@@ -2,21 +2,20 @@
 //! each needs, how fast it is, and how large its errors are.
 //!
 //! ```
-//! use simpulse::engine::bodies::{BodyDef, ShapeDef};
-//! use simpulse::engine::{solvers, world::{Settings, World}};
+//! use simpulse::prelude::*;
 //!
-//! let mut world = World::new(Settings::new(solvers::find("shim")?));
+//! let mut world = World::default();
 //! world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(20.0, 1.0)?))?;
 //! let ball = world.add_body(&BodyDef::dynamic([0.0, 3.0]).with(ShapeDef::circle(0.5)?))?;
 //! for _ in 0..120 {
 //!     world.step()?;
 //! }
-//! println!("{:?}", world.bodies.origin(ball.index()));
+//! println!("{:?}", world.body(ball)?.position());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! **As a library:** start with [`engine`]: how to build for your CPU, which results are bit-identical, and
-//! how to add, move, query and remove bodies. [`changelog`] lists changes.
+//! **As a library:** start with [`engine_guide`]: how to build for your CPU, which results are bit-identical, and
+//! how to add, move, query and remove bodies. [`prelude`] has what most programs use. [`changelog`] lists changes.
 //!
 //! # Three layers
 //!
@@ -28,31 +27,31 @@
 //! engine    shapes, contacts, batches, solvers, world          (always)
 //! ```
 //!
-//! Imports point downward only. [`engine`] alone depends on `wide`, `bytemuck` and `glam`;
+//! Imports point downward only. The engine alone depends on `wide`, `bytemuck` and `glam`;
 //! `default-features = false` leaves just that.
 //!
 //! # The pipeline
 //!
 //! ```text
-//! scenes ──► bodies, shapes                          lab::scenes, engine::{bodies, shapes}
+//! scenes ──► bodies, shapes                          lab::scenes, bodies, shapes
 //!               │
 //!               ▼  every step
-//!            bounds ──► candidate pairs              engine::broadphase
+//!            bounds ──► candidate pairs              broadphase
 //!               │
 //!               ▼
-//!            manifolds with kept impulses            engine::{narrowphase, contacts}
+//!            manifolds with kept impulses            narrowphase, contacts
 //!               │
 //!               ▼
-//!            colors: no body twice in one            engine::coloring
+//!            colors: no body twice in one            coloring
 //!               │
 //!               ▼
-//!            records: W contacts per vector          engine::{constraints, lanes}
+//!            records: W contacts per vector          constraints, lanes
 //!               │
 //!               ▼
-//!            a solver's schedule of passes           engine::solvers
+//!            a solver's schedule of passes           solvers
 //!               │
 //!               ▼
-//!            impulses and poses written back         engine::world
+//!            impulses and poses written back         world
 //!               │
 //!               ▼
 //!            errors, times, tables                   lab::{metrics, study, report}
@@ -60,16 +59,23 @@
 //!
 //! # Reading order
 //!
-//! [`engine::world`] is the step. [`engine::solvers::pgs`] explains the method.
-//! [`engine::constraints::kernels::velocity::sweep`] is the kernel that solvers share, built on
-//! [`engine::lanes`].
+//! [`world`] is the step. [`solvers::pgs`] explains the method.
+//! [`constraints::kernels::velocity::sweep`] is the kernel that solvers share, built on
+//! [`lanes`].
 //! `lab::scenes` has the scenes and their known values. `lab::metrics` measures errors.
 
 // `println!` panics if the reader of the pipe is gone, so the program prints through `cli::output`.
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 #[doc(inline)]
+pub use simpulse_engine::*;
+
+/// The engine as a whole, as the upper layers and the tests of this repository name it.
+#[doc(hidden)]
 pub use simpulse_engine as engine;
+
+#[doc = include_str!("engine/README.md")]
+pub mod engine_guide {}
 
 #[cfg(feature = "lab")]
 pub mod lab;

@@ -88,7 +88,7 @@ fn a_steady_step_with_events_allocates_nothing() {
         for _ in 0..10 {
             world.apply_force(body, [1.0, 0.0]).unwrap();
             world.step().unwrap();
-            assert!(world.contact_events().is_empty() && world.contacts_of(body).unwrap().count() > 0);
+            assert!(world.contact_events().is_empty() && world.body(body).unwrap().contacts().count() > 0);
         }
     });
     assert_eq!(count, 0);
@@ -104,7 +104,7 @@ fn shapes_that_come_and_go_leave_no_memory_behind() {
     let mut world = empty();
     let mut live = [0; 2];
     for round in 0..4000 {
-        let shape = ShapeDef::circle(0.1 + 1e-4 * round as f32).unwrap();
+        let shape = ShapeDef::circle(0.1 + 1e-4 * f64::from(round)).unwrap();
         let body = world.add_body(&BodyDef::dynamic([0.0; 2]).with(shape)).unwrap();
         world.step().unwrap();
         world.remove_body(body).unwrap();

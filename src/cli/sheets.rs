@@ -160,7 +160,7 @@ fn write_joints(sheet: &mut CsvFile, world: &World) -> Result<(), Error> {
         let impulses = lines.get(&handle.index()).copied().unwrap_or_default();
         let names = (world.step_index, handle.index(), joint.kind.name(), joint.a.index(), joint.b.index());
         let errors = (state.gap, state.lean, state.angle, state.translation, state.excess);
-        sheet.row((names, errors, impulses, state.load, state.breaks))?;
+        sheet.row((names, errors, impulses, state.load(), state.breaks))?;
     }
     Ok(())
 }

@@ -73,8 +73,8 @@ impl Phase {
 ///
 /// ```
 /// use simpulse_engine::clock::Phase;
-/// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
-/// let mut world = World::new(Settings { timed: true, ..Settings::new(solvers::find("pgs")?) });
+/// # use simpulse_engine::prelude::*;
+/// let mut world = World::new(Settings { timed: true, ..Settings::new(solvers::PGS) });
 /// world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::circle(0.5)?))?;
 /// world.step()?;
 /// for phase in Phase::ALL {

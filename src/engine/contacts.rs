@@ -39,8 +39,8 @@ pub struct Manifold {
 /// Two shapes close enough to touch: eight quads, two cache lines.
 ///
 /// ```
-/// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
-/// let settings = Settings { record_impulses: true, ..Settings::new(solvers::find("shim")?) };
+/// # use simpulse_engine::prelude::*;
+/// let settings = Settings { record_impulses: true, ..Settings::default() };
 /// let mut world = World::new(settings);
 /// world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(10.0, 1.0)?))?;
 /// world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?))?;

@@ -7,18 +7,21 @@ use std::fmt;
 
 /// A value or a name that the engine rejects.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Error {
-    /// A value out of its range.
+    /// A value out of its range, or the handle of another world.
     Invalid {
         /// Path of the value, for example `vertices`.
         place: String,
         /// The reason, with the value.
         message: String,
     },
-    /// The handle of a removed body.
+    /// The handle of a removed body or joint.
     Removed {
-        /// Index of the removed body.
-        body: usize,
+        /// `body` or `joint`.
+        kind: &'static str,
+        /// Its index.
+        index: usize,
     },
     /// A name that is not in its table.
     Unknown {
@@ -52,7 +55,7 @@ impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Error::Invalid { place, message } => write!(f, "{place}: {message}"),
-            Error::Removed { body } => write!(f, "body {body} was removed"),
+            Error::Removed { kind, index } => write!(f, "{kind} {index} was removed"),
             Error::Unknown { kind, name, known } => {
                 write!(f, "unknown {kind} '{name}': one of {}", known.join(", "))
             }

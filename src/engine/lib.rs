@@ -1,23 +1,22 @@
 //! The engine: advances bodies and their shapes one step at a time.
 //!
 //! ```
-//! use simpulse_engine::bodies::{BodyDef, ShapeDef};
-//! use simpulse_engine::{lanes, solvers, world::{Settings, World}};
+//! use simpulse_engine::{lanes, prelude::*};
 //!
 //! if let Some(line) = lanes::unused_cpu_features() {
 //!     eprintln!("{line}");
 //! }
-//! let mut world = World::new(Settings::new(solvers::find("soft_step")?));
+//! let mut world = World::new(Settings::new(solvers::SOFT_STEP));
 //! world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(50.0, 1.0)?))?;
 //! let top = world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
 //! for _ in 0..60 {
 //!     world.step()?;
 //! }
-//! assert!((world.bodies.position_y[top.index()] - 0.5).abs() < 1e-3);
+//! assert!((world.body(top)?.position()[1] - 0.5).abs() < 1e-3);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The crate `simpulse` re-exports this one as `simpulse::engine`. Being its own crate, its kernels are
+//! The crate `simpulse` re-exports the modules of this one. Being its own crate, its kernels are
 //! compiled once, independently of the laboratory.
 #![doc = include_str!("README.md")]
 #![deny(clippy::print_stdout, clippy::print_stderr)]
@@ -38,6 +37,7 @@ pub mod lanes;
 #[doc(hidden)]
 pub mod narrowphase;
 pub mod params;
+pub mod prelude;
 pub mod shapes;
 pub mod solvers;
 #[doc(hidden)]

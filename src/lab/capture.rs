@@ -34,7 +34,7 @@ use glam::Vec2;
 /// [`reference`](crate::lab::reference::certify::reference).
 ///
 /// ```
-/// use simpulse::engine::{solvers, world::Settings};
+/// use simpulse::{solvers, world::Settings};
 /// use simpulse::lab::{capture::capture, reference::certify, scenes};
 ///
 /// let mut world = scenes::load("stack:3")?.scene.build(Settings::new(solvers::find("pgs")?))?;
@@ -53,7 +53,7 @@ pub fn capture(world: &mut World, name: impl Into<String>) -> ContactProblem {
     let mut bodies = Vec::new();
     let mut index = Vec::new();
     for i in 0..world.bodies.len() {
-        let moves = world.bodies.kind[i] != BodyKind::Static;
+        let moves = world.bodies.kind(i) != BodyKind::Static;
         index.push(moves.then_some(bodies.len() as u32));
         if moves {
             bodies.push(body(world, i));
@@ -115,7 +115,7 @@ fn body(world: &World, i: usize) -> ProblemBody {
     let inv_inertia = if turns { f64::from(b.inv_inertia[i]) } else { 0.0 };
     let velocity: Velocity = [b.velocity_x[i], b.velocity_y[i], b.angular_velocity[i]].map(f64::from);
     let mut free_velocity = velocity;
-    if b.kind[i] == BodyKind::Dynamic {
+    if b.kind(i) == BodyKind::Dynamic {
         let scale = f64::from(b.gravity_scale[i]);
         let [gx, gy] = world.settings.gravity.map(f64::from);
         let [fx, fy, torque] = [b.force_x[i], b.force_y[i], b.torque[i]].map(f64::from);

@@ -103,8 +103,9 @@ impl From<crate::engine::error::Error> for Error {
         use crate::engine::error::Error as Engine;
         match error {
             Engine::Invalid { place, message } => Error::Invalid { place, message },
-            Engine::Removed { body } => Error::invalid(format!("body {body}"), "was removed"),
+            Engine::Removed { kind, index } => Error::invalid(format!("{kind} {index}"), "was removed"),
             Engine::Unknown { kind, name, known } => Error::unknown(kind, &name, known.into_iter()),
+            other => Error::invalid("engine", other.to_string()),
         }
     }
 }

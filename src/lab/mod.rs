@@ -4,7 +4,7 @@
 //! Run a scene from JSON under a solver, measure its errors, and add your own metric:
 //!
 //! ```
-//! use simpulse::engine::{solvers, world::Settings};
+//! use simpulse::{solvers, world::Settings};
 //! use simpulse::lab::{metrics::Observation, scenes::Scene};
 //!
 //! let text = r#"{ "name": "drop", "steps": 60, "bodies": [
@@ -31,7 +31,7 @@
 //! Run a study and read its CSV:
 //!
 //! ```
-//! use simpulse::engine::solvers::find;
+//! use simpulse::solvers::find;
 //! use simpulse::lab::report::columns::study_csv;
 //! use simpulse::lab::report::environment::Environment;
 //! use simpulse::lab::study::{self, StudyPlan};
@@ -53,7 +53,7 @@
 //! Freeze the contact problem of one step and solve it exactly:
 //!
 //! ```
-//! use simpulse::engine::{solvers, world::Settings};
+//! use simpulse::{solvers, world::Settings};
 //! use simpulse::lab::{capture::capture, reference::certify, scenes};
 //!
 //! let mut world = scenes::load("pyramid:3")?.scene.build(Settings::new(solvers::find("pgs")?))?;
@@ -69,7 +69,7 @@
 //! Save a world as JSON and load it; the copy continues bit-identically:
 //!
 //! ```
-//! use simpulse::engine::{solvers, world::{Settings, World}};
+//! use simpulse::{solvers, world::{Settings, World}};
 //! use simpulse::lab::scenes;
 //!
 //! let mut world = scenes::load("stack:3")?.scene.build(Settings::new(solvers::find("soft_step")?))?;

@@ -86,7 +86,7 @@ impl Pokes {
         let impulse = speed / f64::from(world.bodies.inv_mass[body]);
         let [x, y] = world.bodies.center(body);
         let point = [x + arm * offset.1, y + arm * offset.0];
-        world.apply_impulse(handle, [push.1, push.0].map(|u| (impulse * u) as f32), point)?;
+        world.apply_impulse(handle, [push.1, push.0].map(|u| impulse * u), point)?;
         Ok(())
     }
 }

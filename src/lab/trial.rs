@@ -3,7 +3,7 @@
 //! All commands that judge a run step it here, so that "diverged" and "holds" mean the same everywhere:
 //!
 //! ```
-//! use simpulse::engine::{solvers, world::Settings};
+//! use simpulse::{solvers, world::Settings};
 //! use simpulse::lab::{scenes, trial::Trial};
 //!
 //! let mut loaded = scenes::load("stack:3")?;

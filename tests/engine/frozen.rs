@@ -25,7 +25,7 @@ fn world(frozen: Freezing, is_stiff: bool) -> World {
 }
 
 fn block(half_width: f32, half_height: f32, friction: f64) -> ShapeDef {
-    ShapeDef::rectangle(half_width, half_height).unwrap().with_friction(friction)
+    ShapeDef::rectangle(half_width.into(), half_height.into()).unwrap().with_friction(friction)
 }
 
 fn column(frozen: Freezing, height: u32) -> World {

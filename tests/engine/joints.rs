@@ -28,7 +28,7 @@ fn chain(world: &mut World, ground: BodyHandle, links: usize, radius: f32) -> Ve
         before = body;
     }
     let x = links as f64;
-    let ball = ShapeDef::circle(radius).unwrap().with_density(20.0);
+    let ball = ShapeDef::circle(radius.into()).unwrap().with_density(20.0);
     let ball = world.add_body(&damped(BodyDef::dynamic([x + f64::from(radius), 20.0]).with(ball))).unwrap();
     joints.push(world.add_joint(&Joint::revolute(before, ball).anchor([x, 20.0])).unwrap());
     joints
@@ -161,13 +161,13 @@ fn joints_between_free_bodies_give_no_momentum() {
         for kind in 0..3 {
             let mut world = World::new(Settings { gravity: [0.0; 2], ..Settings::new(solver) });
             let body =
-                |at: [f64; 2], half: f32| BodyDef::dynamic(at).with(ShapeDef::rectangle(half, 0.5).unwrap());
+                |at: [f64; 2], half: f64| BodyDef::dynamic(at).with(ShapeDef::rectangle(half, 0.5).unwrap());
             let a = world.add_body(&body([0.0; 2], 1.0)).unwrap();
             let b = world.add_body(&body([3.0, 1.0], 0.5).with_angle(0.5)).unwrap();
             let joint = match kind {
-                0 => Joint::motor_joint(a, b, 50.0, 50.0).spring(1.0, 1.0),
-                1 => Joint::mouse(a, b, [3.2, 1.0], 50.0).spring(1.0, 1.0),
-                _ => Joint::weld(a, b).spring(1.0, 0.1),
+                0 => Joint::motor_joint(a, b, 50.0, 50.0).spring(1.0, 1.0).unwrap(),
+                1 => Joint::mouse(a, b, [3.2, 1.0], 50.0).spring(1.0, 1.0).unwrap(),
+                _ => Joint::weld(a, b).spring(1.0, 0.1).unwrap(),
             };
             world.add_joint(&Joint { at: Some([[0.0, 2.0], [3.2, 1.0]]), ..joint }).unwrap();
             for _ in 0..300 {
@@ -297,7 +297,7 @@ fn joined_bodies_collide_if_they_are_told_to() {
 fn the_angle_of_a_driven_wheel_is_not_wrapped() {
     let (mut world, ground) = empty(find("shim").unwrap());
     let wheel = world.add_body(&BodyDef::dynamic([0.0; 2]).with(ShapeDef::circle(1.0).unwrap())).unwrap();
-    let joint = world.add_joint(&Joint::revolute(ground, wheel).anchor([0.0; 2]).motor(3.0, 1e3)).unwrap();
+    let joint = world.add_joint(&Joint::revolute(ground, wheel).anchor([0.0; 2]).motor(3.0, 1e3).unwrap()).unwrap();
     (0..460).for_each(|_| world.step().unwrap());
     let angle = world.joint_state(joint).unwrap().angle;
     assert!((angle - 3.0 * 460.0 / 60.0).abs() < 0.1, "{angle}");
@@ -312,7 +312,7 @@ fn joints_that_cannot_be_are_refused_in_one_line() {
     assert_eq!(refused(Joint::revolute(disc, disc)), "b: body 1 has no joint to itself");
     assert_eq!(refused(Joint::weld(ground, fixed)), "b: neither body 0 nor body 2 moves by forces");
     assert_eq!(
-        refused(Joint::revolute(ground, disc).limits(1.0, -1.0)),
+        refused(Joint::revolute(ground, disc).limits(1.0, -1.0).unwrap()),
         "revolute.limits: lower must not be above upper, is [1, -1]"
     );
     assert_eq!(
@@ -320,10 +320,10 @@ fn joints_that_cannot_be_are_refused_in_one_line() {
         "prismatic.axis: must have a direction, is [0, 0]"
     );
     assert_eq!(
-        refused(Joint::wheel(ground, disc, [0.0, 1.0]).spring(-1.0, 0.5)),
+        refused(Joint::wheel(ground, disc, [0.0, 1.0]).spring(-1.0, 0.5).unwrap()),
         "wheel.spring.hertz: must not be negative, is -1"
     );
-    let text = refused(Joint::revolute(ground, disc).motor(f64::NAN, 1.0));
+    let text = refused(Joint::revolute(ground, disc).motor(f64::NAN, 1.0).unwrap());
     assert_eq!(text, "revolute.motor.speed: must be finite in 32 bits, is NaN");
 }
 
@@ -434,7 +434,7 @@ fn a_bridge_with_friction_in_its_hinges_catches_boxes() {
             world.add_body(&BodyDef::dynamic([x + 0.5, 0.0]).with(plank)).unwrap()
         };
         let hinge = Joint::revolute(before, body).anchor([x, 0.0]);
-        joints.push(world.add_joint(&hinge.motor(0.0, 500.0)).unwrap());
+        joints.push(world.add_joint(&hinge.motor(0.0, 500.0).unwrap()).unwrap());
         before = body;
     }
     for i in 0..4 {
@@ -457,7 +457,7 @@ fn a_bridge_with_friction_in_its_hinges_catches_boxes() {
 fn beam(world: &mut World, ground: BodyHandle, planks: usize, [length, height]: [f32; 2]) {
     let mut before = ground;
     for i in 0..planks {
-        let plank = ShapeDef::rectangle(0.5 * length, 0.5 * height).unwrap();
+        let plank = ShapeDef::rectangle(f64::from(0.5 * length), f64::from(0.5 * height)).unwrap();
         let [from, middle] = [0.0, 0.5].map(|part| (i as f64 + part) * f64::from(length));
         let body = world.add_body(&BodyDef::dynamic([middle, 0.0]).with(plank)).unwrap();
         world.add_joint(&Joint::weld(before, body).anchor([from, 0.0])).unwrap();
@@ -608,7 +608,7 @@ fn a_welded_plank_stays_where_it_is_hit() {
     world.settings.budget.substeps = 2;
     beam(&mut world, ground, 1, [1.0, 0.2]);
     for (i, radius) in [0.3, 0.5].into_iter().enumerate() {
-        let ball = ShapeDef::circle(radius).unwrap().with_density(20.0);
+        let ball = ShapeDef::circle(radius.into()).unwrap().with_density(20.0);
         let at = [0.9, 1.5 + 2.0 * i as f64];
         world.add_body(&BodyDef { velocity: [0.0, -8.0], ..BodyDef::dynamic(at).with(ball) }).unwrap();
     }
@@ -740,7 +740,7 @@ fn turning_rod(solver: &'static Variant, with: impl Fn(Joint) -> Joint) -> (Worl
 #[test]
 fn a_torsion_spring_swings_at_its_frequency() {
     for solver in VARIANTS.into_iter().filter(|solver| solver.joints_unsupported.is_none()) {
-        let (mut world, rod) = turning_rod(solver, |joint| joint.spring(1.0, 0.0));
+        let (mut world, rod) = turning_rod(solver, |joint| joint.spring(1.0, 0.0).unwrap());
         let (mut crossings, mut before) = (vec![], 0.0);
         for i in 0..600 {
             world.step().unwrap();
@@ -760,7 +760,7 @@ fn a_torsion_spring_swings_at_its_frequency() {
 #[test]
 fn a_limit_stops_what_turns_against_it() {
     for solver in VARIANTS.into_iter().filter(|solver| solver.joints_unsupported.is_none()) {
-        let (mut world, rod) = turning_rod(solver, |joint| joint.limits(-1.0, 0.5));
+        let (mut world, rod) = turning_rod(solver, |joint| joint.limits(-1.0, 0.5).unwrap());
         let mut back = 0.0_f32;
         for _ in 0..90 {
             world.step().unwrap();

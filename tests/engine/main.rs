@@ -2,6 +2,7 @@
 
 mod coloring;
 mod convex;
+mod face;
 mod frozen;
 mod joints;
 mod kernel;

@@ -136,7 +136,7 @@ fn divergence_is_reported_with_body_and_step() {
 fn the_speed_that_is_a_divergence_follows_the_length_unit() {
     for (length_unit, diverges) in [(1.0, false), (0.01, true)] {
         let mut world = World::new(Settings { length_unit, ..Settings::new(find("pgs").unwrap()) });
-        let ball = ShapeDef::circle(0.5 * length_unit).unwrap();
+        let ball = ShapeDef::circle(f64::from(0.5 * length_unit)).unwrap();
         world.add_body(&BodyDef::dynamic([0.0, 0.0]).with_velocity([2e3, 0.0]).with(ball)).unwrap();
         assert_eq!(world.step().is_err(), diverges, "{length_unit} m");
     }

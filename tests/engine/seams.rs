@@ -12,7 +12,6 @@ fn turned([x, y]: [f64; 2], angle: f64) -> [f64; 2] {
 }
 
 fn line(from: [f64; 2], to: [f64; 2], friction: f64) -> ShapeDef {
-    let [from, to] = [from, to].map(|point| point.map(|x| x as f32));
     ShapeDef::segment(from, to).unwrap().with_friction(friction)
 }
 

@@ -345,7 +345,7 @@ fn a_replayed_problem_is_the_step_of_the_world() {
             replay(&problem, sequence, variant).run(variant, budget, Start::Warm);
         world.frozen_step();
         assert_eq!(sweeps, world.counts.sweeps);
-        let kinds = world.bodies.kind.clone();
+        let kinds = (0..world.bodies.len()).map(|i| world.bodies.kind(i)).collect::<Vec<_>>();
         let moving = (0..kinds.len()).filter(|&i| kinds[i] != BodyKind::Static);
         let rows = &world.workspace().rows;
         for (replayed, i) in velocities.iter().zip(moving) {
@@ -393,7 +393,7 @@ fn a_captured_step_with_joints_is_the_step() {
         world.step().unwrap();
         let found = replay(&problem, Sequence::Natural, pgs).run(pgs, budget, Start::Warm);
         let b = &world.bodies;
-        for (i, found) in (0..b.len()).filter(|&i| b.kind[i] != BodyKind::Static).zip(&found.velocities) {
+        for (i, found) in (0..b.len()).filter(|&i| b.kind(i) != BodyKind::Static).zip(&found.velocities) {
             for (found, exact) in found.iter().zip([b.velocity_x[i], b.velocity_y[i], b.angular_velocity[i]])
             {
                 // Free velocities round differently. Everything else is the same arithmetic.

@@ -4,7 +4,7 @@ use super::BodyKind;
 use crate::error::Error;
 use crate::params::{DEFAULT_DENSITY, DEFAULT_FRICTION};
 use crate::shapes::{MassProperties, Shape, combine};
-use glam::Vec2;
+use glam::{DVec2, Vec2};
 
 /// Maximum friction coefficient (1), so that the product of two is finite in `f32`.
 pub const MAX_FRICTION: f64 = 1e9;
@@ -77,34 +77,34 @@ impl ShapeDef {
     }
 
     /// A rectangle centered at the origin of the body. Half extents in m; errors: as [`Shape::rectangle`].
-    pub fn rectangle(half_width: f32, half_height: f32) -> Result<Self, Error> {
-        Shape::rectangle("rectangle", Vec2::new(half_width, half_height), Vec2::ZERO, 0.0, 0.0).map(Self::new)
+    pub fn rectangle(half_width: f64, half_height: f64) -> Result<Self, Error> {
+        Shape::rectangle("rectangle", rounded([half_width, half_height]), Vec2::ZERO, 0.0, 0.0).map(Self::new)
     }
 
     /// A disc centered at the origin of the body. Radius in m; errors: as [`Shape::circle`].
-    pub fn circle(radius: f32) -> Result<Self, Error> {
-        Shape::circle("circle", Vec2::ZERO, radius).map(Self::new)
+    pub fn circle(radius: f64) -> Result<Self, Error> {
+        Shape::circle("circle", Vec2::ZERO, radius as f32).map(Self::new)
     }
 
     /// All points within `radius` of the segment a–b (m). Errors: as [`Shape::capsule`].
-    pub fn capsule(a: [f32; 2], b: [f32; 2], radius: f32) -> Result<Self, Error> {
-        Shape::capsule("capsule", a.into(), b.into(), radius).map(Self::new)
+    pub fn capsule(a: [f64; 2], b: [f64; 2], radius: f64) -> Result<Self, Error> {
+        Shape::capsule("capsule", rounded(a), rounded(b), radius as f32).map(Self::new)
     }
 
     /// A massless line from a to b (m), for static bodies. Errors: as [`Shape::segment`].
-    pub fn segment(a: [f32; 2], b: [f32; 2]) -> Result<Self, Error> {
-        Shape::segment("segment", a.into(), b.into()).map(Self::new)
+    pub fn segment(a: [f64; 2], b: [f64; 2]) -> Result<Self, Error> {
+        Shape::segment("segment", rounded(a), rounded(b)).map(Self::new)
     }
 
     /// A convex polygon of 3 to 8 vertices (m), in either winding. Errors: as [`Shape::polygon`].
-    pub fn polygon(vertices: &[[f32; 2]]) -> Result<Self, Error> {
-        let vertices: Vec<Vec2> = vertices.iter().map(|&v| v.into()).collect();
+    pub fn polygon(vertices: &[[f64; 2]]) -> Result<Self, Error> {
+        let vertices: Vec<Vec2> = vertices.iter().copied().map(rounded).collect();
         Shape::polygon("polygon", &vertices, 0.0).map(Self::new)
     }
 
     /// Moves the shape by `offset` (m) in the frame of the body.
-    pub fn at(self, offset: [f32; 2]) -> Self {
-        ShapeDef { shape: self.shape.translated(offset.into()), ..self }
+    pub fn at(self, offset: [f64; 2]) -> Self {
+        ShapeDef { shape: self.shape.translated(rounded(offset)), ..self }
     }
 
     /// Sets the density (kg/m²).
@@ -175,8 +175,8 @@ impl BodyDef {
     /// A body that keeps its given velocity in every collision, at `position` (m), without shapes.
     ///
     /// ```
-    /// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
-    /// let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// # use simpulse_engine::prelude::*;
+    /// let mut world = World::default();
     /// let belt = BodyDef::kinematic([0.0, -1.0]).with(ShapeDef::rectangle(50.0, 1.0)?).with_velocity([1.0, 0.0]);
     /// world.add_body(&belt)?;
     /// let cargo = world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
@@ -184,7 +184,7 @@ impl BodyDef {
     ///     world.step()?;
     /// }
     /// // Friction has brought the box to the speed of the belt.
-    /// assert!((world.bodies.velocity_x[cargo.index()] - 1.0).abs() < 1e-3);
+    /// assert!((world.body(cargo)?.velocity()[0] - 1.0).abs() < 1e-3);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn kinematic(position: [f64; 2]) -> Self {
@@ -249,6 +249,11 @@ impl BodyDef {
         }
         Ok(mass)
     }
+}
+
+/// A vector as shapes store it.
+fn rounded(v: [f64; 2]) -> Vec2 {
+    DVec2::from(v).as_vec2()
 }
 
 pub(crate) fn finite(place: &str, value: f64) -> Result<(), Error> {

@@ -85,7 +85,7 @@ pub struct Bodies {
     /// From the body's origin to its center of mass, body axes (m).
     pub(crate) local_center: Vec<Vec2>,
     /// How each body moves.
-    pub kind: Vec<BodyKind>,
+    pub(crate) kind: Vec<BodyKind>,
     /// Collision group of each body; 0 is none.
     pub(crate) group: Vec<i32>,
     /// Whether dynamic bodies also stop it in continuous collision.
@@ -243,6 +243,11 @@ impl Bodies {
     /// Collision group of body `i`; 0 is none. See [`World::set_group`](crate::world::World::set_group).
     pub fn group(&self, i: usize) -> i32 {
         self.group[i]
+    }
+
+    /// How body `i` moves.
+    pub fn kind(&self, i: usize) -> BodyKind {
+        self.kind[i]
     }
 
     /// Whether body `i` is moved by impulses.

@@ -54,7 +54,7 @@ pub struct FatBoxes {
     sin: LaneVec,
     /// r of (1), the largest of the body's shapes (m).
     reach: LaneVec,
-    /// The smallest slack of the body's shapes (m); infinite for a static body.
+    /// The smallest slack of the body's shapes (m); infinite if it has none.
     slack: LaneVec,
     /// Core points of each shape, for lanes, `[shapes]`.
     outlines: Vec<CoreOutline>,
@@ -115,9 +115,16 @@ impl FatBoxes {
 
     /// Lists the bodies for which (1) exceeds the slack or is NaN.
     fn find_failed(&mut self, bodies: &Bodies) {
-        self.failed.clear();
+        let mut failed = std::mem::take(&mut self.failed);
+        failed.clear();
+        failed.reserve(self.first_shape.len());
+        self.failing(bodies, |body| failed.push(body as u32));
+        self.failed = failed;
+    }
+
+    /// Calls `found` with every body for which (1) exceeds the slack or is NaN, ascending.
+    pub fn failing(&self, bodies: &Bodies, mut found: impl FnMut(usize)) {
         let count = self.first_shape.len();
-        self.failed.reserve(count);
         let columns = [&self.x, &self.y, &self.cos, &self.sin, &self.reach, &self.slack];
         let [x0, y0, cos0, sin0, reach, slack] = columns.map(|c| c.lanes::<f32x16>());
         let columns = [&bodies.position_x, &bodies.position_y, &bodies.rotation_cos, &bodies.rotation_sin];
@@ -128,10 +135,10 @@ impl FatBoxes {
             let shift = (x[i] - x0[i]).abs().fast_max((y[i] - y0[i]).abs());
             let mut failed = !(shift + reach[i] * turn).simd_le(slack[i]).to_bitmask() & 0xFFFF;
             while failed != 0 {
-                let body = 16 * i as u32 + failed.trailing_zeros();
+                let body = 16 * i + failed.trailing_zeros() as usize;
                 failed &= failed - 1;
-                if (body as usize) < count {
-                    self.failed.push(body);
+                if body < count {
+                    found(body);
                 }
             }
         }
@@ -156,9 +163,6 @@ impl FatBoxes {
                 self.moved.push(i as u32);
             }
             slack = slack.min(inset(&proxy.aabb, &tight));
-        }
-        if bodies.kind[body] == BodyKind::Static {
-            slack = f32::INFINITY;
         }
         self.slack[body] = slack;
         (self.x[body], self.y[body]) = (pose.position.x, pose.position.y);

@@ -42,6 +42,13 @@ impl Region {
         }
     }
 
+    /// Whether a box overlaps the region.
+    pub fn meets(&self, Aabb { min, max }: &Aabb) -> bool {
+        let mut node = Node::EMPTY;
+        node.set(0, [min.x, min.y, max.x, max.y]);
+        self.hits(&node) != 0
+    }
+
     /// The lanes of a node that overlap the region. The boxes of shapes exceed their shapes by more than the
     /// rounding error.
     fn hits(&self, node: &Node) -> u32 {

@@ -6,6 +6,7 @@ use crate::constraints::joints::rows::{Jacobian, JointPass, RowLaw, dot};
 use crate::constraints::joints::{JointSetup, JointType};
 use crate::error::Error;
 use crate::lanes::Lanes;
+use glam::DVec2;
 
 /// Controls the distance of two points. It is a rigid rod if there is neither spring nor motor nor limits.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -119,9 +120,9 @@ impl Definition for Distance {
         }
     }
 
-    fn load(&self, kept: &[f32]) -> [f64; 2] {
+    fn impulse(&self, kept: &[f32], at: &Measured) -> (DVec2, f64) {
         let form = self.form();
         let along = if form == Form::default() { f64::from(kept[0]) } else { Axial::impulse(form, kept) };
-        [along.abs(), 0.0]
+        (along * at.offset.normalize_or_zero(), 0.0)
     }
 }

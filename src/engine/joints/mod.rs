@@ -1,11 +1,10 @@
 //! Joints and their parameters, one file per type. `constraints/joints` solves them.
 //!
 //! ```
-//! use simpulse_engine::bodies::{BodyDef, ShapeDef};
-//! use simpulse_engine::{joints::Joint, solvers, world::{Settings, World}};
+//! use simpulse_engine::prelude::*;
 //!
 //! // A pendulum of 1 m, released from the side.
-//! let mut world = World::new(Settings::new(solvers::find("shim")?));
+//! let mut world = World::default();
 //! let ceiling = world.add_body(&BodyDef::fixed([0.0, 0.0]))?;
 //! let bob = world.add_body(&BodyDef::dynamic([1.0, 0.0]).with(ShapeDef::circle(0.1)?))?;
 //! let joint = world.add_joint(&Joint::revolute(ceiling, bob).anchor([0.0, 0.0]))?;
@@ -109,6 +108,7 @@ pub struct Form {
 
 /// State of a joint after a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct JointState {
     /// Position error of the rigid rows (m).
     pub gap: f64,
@@ -121,10 +121,19 @@ pub struct JointState {
     pub translation: f64,
     /// How far limits are exceeded (m or rad); 0 within them.
     pub excess: f64,
-    /// Magnitudes of the force (N) and torque (N·m) in the last substep.
-    pub load: [f64; 2],
+    /// Force on b at its anchor in the last substep (N). The force on a is the opposite.
+    pub force: [f64; 2],
+    /// Torque on b in the last substep (N·m), besides that of the force.
+    pub torque: f64,
     /// Whether the load exceeds [`Joint::break_load`].
     pub breaks: bool,
+}
+
+impl JointState {
+    /// Magnitudes of the force (N) and the torque (N·m).
+    pub fn load(&self) -> [f64; 2] {
+        [DVec2::from(self.force).length(), self.torque.abs()]
+    }
 }
 
 /// Relative pose of the two bodies of a joint.
@@ -136,6 +145,13 @@ pub struct Measured {
     pub rotation_a: DVec2,
     /// Angle of b relative to a, from the reference angle (rad); it counts full turns.
     pub angle: f64,
+}
+
+impl Measured {
+    /// A direction in the frame of a, in world axes.
+    fn turned(&self, axis: [f64; 2]) -> DVec2 {
+        self.rotation_a.rotate(DVec2::from(axis).normalize())
+    }
 }
 
 /// Properties of a joint type other than its rows.
@@ -150,8 +166,8 @@ pub(crate) trait Definition: JointType<Form = Form> {
     fn refer(&mut self, _angle: f64, _length: f64) {}
     /// The joint's state at these poses, without its load.
     fn measure(&self, at: &Measured) -> JointState;
-    /// Magnitudes of the linear (N·s) and angular (N·m·s) impulse, from its kept numbers.
-    fn load(&self, kept: &[f32]) -> [f64; 2];
+    /// Linear (N·s) and angular (N·m·s) impulse on b, from its kept numbers.
+    fn impulse(&self, kept: &[f32], at: &Measured) -> (DVec2, f64);
 }
 
 macro_rules! of_kind {
@@ -204,8 +220,8 @@ impl JointKind {
         of_kind!(self, joint => joint.measure(at), else JointState { angle: at.angle, ..JointState::default() })
     }
 
-    pub(crate) fn load(&self, kept: &[f32]) -> [f64; 2] {
-        of_kind!(self, joint => joint.load(kept), else [0.0; 2])
+    pub(crate) fn impulse(&self, kept: &[f32], at: &Measured) -> (DVec2, f64) {
+        of_kind!(self, joint => joint.impulse(kept, at), else (DVec2::ZERO, 0.0))
     }
 }
 
@@ -268,36 +284,36 @@ impl Joint {
         Joint { collide_connected: true, ..self }
     }
 
-    /// Sets limits of the angle (rad), of the displacement along the axis (m) or of the length (m). Kinds
-    /// without limits ignore it.
-    pub fn limits(mut self, lower: f64, upper: f64) -> Self {
+    /// Sets limits of the angle (rad), of the displacement along the axis (m) or of the length (m). Errors: a kind
+    /// without limits.
+    pub fn limits(mut self, lower: f64, upper: f64) -> Result<Self, Error> {
         let limits = Some([lower, upper]);
         match &mut self.kind {
             JointKind::Revolute(joint) => joint.limits = limits,
             JointKind::Prismatic(joint) => joint.limits = limits,
             JointKind::Distance(joint) => joint.limits = limits,
             JointKind::Wheel(joint) => joint.limits = limits,
-            JointKind::Weld(_) | JointKind::Motor(_) | JointKind::Mouse(_) | JointKind::Filter => {}
+            other => return Err(Error::invalid(other.name(), "has no limits")),
         }
-        self
+        Ok(self)
     }
 
-    /// Sets the speed (rad/s or m/s) and maximum torque or force (N·m or N) of the motor. Kinds without a
-    /// motor ignore it.
-    pub fn motor(mut self, speed: f64, max: f64) -> Self {
+    /// Sets the speed (rad/s or m/s) and maximum torque or force (N·m or N) of the motor. Errors: a kind without
+    /// a motor.
+    pub fn motor(mut self, speed: f64, max: f64) -> Result<Self, Error> {
         let motor = Some(Motor { speed, max });
         match &mut self.kind {
             JointKind::Revolute(joint) => joint.motor = motor,
             JointKind::Prismatic(joint) => joint.motor = motor,
             JointKind::Distance(joint) => joint.motor = motor,
             JointKind::Wheel(joint) => joint.motor = motor,
-            JointKind::Weld(_) | JointKind::Motor(_) | JointKind::Mouse(_) | JointKind::Filter => {}
+            other => return Err(Error::invalid(other.name(), "has no motor")),
         }
-        self
+        Ok(self)
     }
 
-    /// Sets the frequency (Hz) and damping ratio (1) of the springs. A filter ignores it.
-    pub fn spring(mut self, hertz: f64, damping_ratio: f64) -> Self {
+    /// Sets the frequency (Hz) and damping ratio (1) of the springs. Errors: a filter.
+    pub fn spring(mut self, hertz: f64, damping_ratio: f64) -> Result<Self, Error> {
         let spring = Spring { hertz, damping_ratio, rest: 0.0 };
         match &mut self.kind {
             JointKind::Revolute(joint) => joint.spring = Some(spring),
@@ -307,9 +323,9 @@ impl Joint {
             JointKind::Wheel(joint) => joint.spring = Some(spring),
             JointKind::Motor(joint) => joint.spring = spring,
             JointKind::Mouse(joint) => joint.spring = spring,
-            JointKind::Filter => {}
+            JointKind::Filter => return Err(Error::invalid("filter", "has no spring")),
         }
-        self
+        Ok(self)
     }
 
     /// The joint with its frames computed from the world points in `at`.

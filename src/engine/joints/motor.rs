@@ -7,6 +7,7 @@ use crate::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
 use crate::constraints::joints::{JointSetup, JointType};
 use crate::error::Error;
 use crate::lanes::Lanes;
+use glam::DVec2;
 
 /// Drives b to a pose relative to a.
 #[derive(Clone, Debug, PartialEq)]
@@ -103,7 +104,7 @@ impl Definition for MotorJoint {
         JointState { angle: at.angle, translation: at.offset.length(), ..JointState::default() }
     }
 
-    fn load(&self, kept: &[f32]) -> [f64; 2] {
-        [f64::from(kept[0].hypot(kept[1])), f64::from(kept[4].abs())]
+    fn impulse(&self, kept: &[f32], _at: &Measured) -> (DVec2, f64) {
+        (DVec2::new(kept[0].into(), kept[1].into()), kept[4].into())
     }
 }

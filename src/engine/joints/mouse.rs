@@ -7,6 +7,7 @@ use crate::constraints::joints::rows::{JointPass, RowLaw};
 use crate::constraints::joints::{JointSetup, JointType};
 use crate::error::Error;
 use crate::lanes::Lanes;
+use glam::DVec2;
 
 /// Pulls a point of b to a target, which may be changed between steps. Body a should not move.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,7 +86,7 @@ impl Definition for Mouse {
         JointState { angle: at.angle, translation: at.offset.length(), ..JointState::default() }
     }
 
-    fn load(&self, kept: &[f32]) -> [f64; 2] {
-        [f64::from(kept[0].hypot(kept[1])), 0.0]
+    fn impulse(&self, kept: &[f32], _at: &Measured) -> (DVec2, f64) {
+        (DVec2::new(kept[0].into(), kept[1].into()), 0.0)
     }
 }

@@ -125,7 +125,7 @@ impl Definition for Prismatic {
     }
 
     fn measure(&self, at: &Measured) -> JointState {
-        let axis = at.rotation_a.rotate(DVec2::from(self.axis).normalize());
+        let axis = at.turned(self.axis);
         let translation = axis.dot(at.offset);
         JointState {
             gap: axis.perp_dot(at.offset).abs(),
@@ -137,7 +137,8 @@ impl Definition for Prismatic {
         }
     }
 
-    fn load(&self, kept: &[f32]) -> [f64; 2] {
-        [f64::from(kept[0]).hypot(Axial::impulse(self.form(), &kept[2..])), f64::from(kept[1].abs())]
+    fn impulse(&self, kept: &[f32], at: &Measured) -> (DVec2, f64) {
+        let along = Axial::impulse(self.form(), &kept[2..]);
+        (at.turned(self.axis).rotate(DVec2::new(along, kept[0].into())), kept[1].into())
     }
 }

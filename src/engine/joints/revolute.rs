@@ -7,6 +7,7 @@ use crate::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
 use crate::constraints::joints::{JointSetup, JointType};
 use crate::error::Error;
 use crate::lanes::Lanes;
+use glam::DVec2;
 
 /// A hinge, optionally with spring, motor and limits of the angle.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -104,7 +105,7 @@ impl Definition for Revolute {
         }
     }
 
-    fn load(&self, kept: &[f32]) -> [f64; 2] {
-        [f64::from(kept[0].hypot(kept[1])), Axial::impulse(self.form(), &kept[2..]).abs()]
+    fn impulse(&self, kept: &[f32], _at: &Measured) -> (DVec2, f64) {
+        (DVec2::new(kept[0].into(), kept[1].into()), Axial::impulse(self.form(), &kept[2..]))
     }
 }

@@ -7,6 +7,7 @@ use crate::constraints::joints::rows::{Jacobian, JointPass, RowLaw};
 use crate::constraints::joints::{JointSetup, JointType};
 use crate::error::Error;
 use crate::lanes::Lanes;
+use glam::DVec2;
 
 /// A weld, rigid or soft. Position and angle have separate springs.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -114,8 +115,8 @@ impl Definition for Weld {
         }
     }
 
-    fn load(&self, kept: &[f32]) -> [f64; 2] {
+    fn impulse(&self, kept: &[f32], _at: &Measured) -> (DVec2, f64) {
         let angle = if self.linear.is_some() { 4 } else { 2 };
-        [f64::from(kept[0].hypot(kept[1])), f64::from(kept[angle].abs())]
+        (DVec2::new(kept[0].into(), kept[1].into()), kept[angle].into())
     }
 }

@@ -113,7 +113,7 @@ impl Definition for Wheel {
     }
 
     fn measure(&self, at: &Measured) -> JointState {
-        let axis = at.rotation_a.rotate(DVec2::from(self.axis).normalize());
+        let axis = at.turned(self.axis);
         let translation = axis.dot(at.offset);
         JointState {
             gap: axis.perp_dot(at.offset).abs(),
@@ -124,10 +124,11 @@ impl Definition for Wheel {
         }
     }
 
-    fn load(&self, kept: &[f32]) -> [f64; 2] {
+    fn impulse(&self, kept: &[f32], at: &Measured) -> (DVec2, f64) {
         let [suspension, drive] = split(self.form());
         let (first, second) = kept[1..].split_at(Axial::kept(suspension));
         let along = Axial::impulse(suspension, first);
-        [f64::from(kept[0]).hypot(along), Axial::impulse(drive, second).abs()]
+        let force = at.turned(self.axis).rotate(DVec2::new(along, kept[0].into()));
+        (force, Axial::impulse(drive, second))
     }
 }

@@ -5,11 +5,10 @@
 //! Two solvers on the same stack:
 //!
 //! ```
-//! use simpulse_engine::bodies::{BodyDef, ShapeDef};
-//! use simpulse_engine::{solvers, world::{Settings, World}};
+//! use simpulse_engine::prelude::*;
 //!
-//! let sag = |solver: &str| -> Result<f32, Box<dyn std::error::Error>> {
-//!     let mut world = World::new(Settings::new(solvers::find(solver)?));
+//! let sag = |solver| -> Result<f32, Box<dyn std::error::Error>> {
+//!     let mut world = World::new(Settings::new(solver));
 //!     world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(50.0, 1.0)?))?;
 //!     for i in 0..5 {
 //!         let cube = ShapeDef::rectangle(0.5, 0.5)?;
@@ -21,7 +20,7 @@
 //!     let overlaps = world.contacts.iter().map(|c| -c.manifold.points[0].separation);
 //!     Ok(overlaps.fold(0.0, f32::max))
 //! };
-//! assert!(sag("shim")? < 0.5 * sag("soft_step")?);
+//! assert!(sag(solvers::SHIM)? < 0.5 * sag(solvers::SOFT_STEP)?);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -69,45 +68,57 @@ pub mod tgs_soft;
 pub mod tgs_sticky;
 pub mod xpbd;
 
-/// Every solver of the crate.
-pub static VARIANTS: [&Variant; 34] = [
-    &projection::SOLVER,
-    &pgs::SOLVER,
-    &pgs_ngs::SOLVER,
-    &pgs_ngs_block::SOLVER,
-    &pgs_soft::SOLVER,
-    &pgs_substeps::SOLVER,
-    &symmetric_gs::SOLVER,
-    &sor::SOLVER,
-    &random_order::SOLVER,
-    &local_gs::SOLVER,
-    &nsgs::SOLVER,
-    &nncg::SOLVER,
-    &anderson::SOLVER,
-    &apgd::SOLVER,
-    &barzilai_borwein::SOLVER,
-    &staggered::SOLVER,
-    &admm::SOLVER,
-    &direct::SOLVER,
-    &sap::SOLVER,
-    &shock::SOLVER,
-    &split_impulse::SOLVER,
-    &jacobi::SOLVER,
-    &mass_splitting::SOLVER,
-    &tgs_ngs::SOLVER,
-    &tgs_soft::SOLVER,
-    &tgs_sticky::SOLVER,
-    &xpbd::SOLVER,
-    &avbd::SOLVER,
-    &soft_step::SOLVER,
-    &shim::SOLVER,
-    &box2d::SOLVER,
-    &rapier::SOLVER,
-    &physx::SOLVER,
-    &jolt::SOLVER,
-];
+/// The solvers as values, and the table of them.
+macro_rules! table {
+    ($($name:ident = $file:ident,)*) => {
+        $(
+            #[doc = concat!("[`", stringify!($file), "`]")]
+            pub const $name: &Variant = &$file::SOLVER;
+        )*
 
-/// Solver used if none is named.
+        /// Every solver of the crate.
+        pub static VARIANTS: [&Variant; 34] = [$($name),*];
+    };
+}
+
+table! {
+    PROJECTION = projection,
+    PGS = pgs,
+    PGS_NGS = pgs_ngs,
+    PGS_NGS_BLOCK = pgs_ngs_block,
+    PGS_SOFT = pgs_soft,
+    PGS_SUBSTEPS = pgs_substeps,
+    SYMMETRIC_GS = symmetric_gs,
+    SOR = sor,
+    RANDOM_ORDER = random_order,
+    LOCAL_GS = local_gs,
+    NSGS = nsgs,
+    NNCG = nncg,
+    ANDERSON = anderson,
+    APGD = apgd,
+    BARZILAI_BORWEIN = barzilai_borwein,
+    STAGGERED = staggered,
+    ADMM = admm,
+    DIRECT = direct,
+    SAP = sap,
+    SHOCK = shock,
+    SPLIT_IMPULSE = split_impulse,
+    JACOBI = jacobi,
+    MASS_SPLITTING = mass_splitting,
+    TGS_NGS = tgs_ngs,
+    TGS_SOFT = tgs_soft,
+    TGS_STICKY = tgs_sticky,
+    XPBD = xpbd,
+    AVBD = avbd,
+    SOFT_STEP = soft_step,
+    SHIM = shim,
+    BOX2D = box2d,
+    RAPIER = rapier,
+    PHYSX = physx,
+    JOLT = jolt,
+}
+
+/// Name of the solver used if none is given: [`SHIM`].
 pub const DEFAULT: &str = "shim";
 
 /// The fields of a [`Budget`] that a solver's schedule uses.

@@ -67,8 +67,8 @@ pub enum Criterion {
 /// The body and the step at which a simulation diverged.
 ///
 /// ```
-/// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
-/// let mut world = World::new(Settings::new(solvers::find("pgs")?));
+/// # use simpulse_engine::prelude::*;
+/// let mut world = World::new(Settings::new(solvers::PGS));
 /// let fast = BodyDef::dynamic([0.0, 0.0]).with_velocity([2e5, 0.0]);
 /// world.add_body(&fast.with(ShapeDef::circle(0.5)?))?;
 /// let error = world.step().unwrap_err();
@@ -95,7 +95,7 @@ impl std::error::Error for Divergence {}
 ///
 /// ```
 /// # use simpulse_engine::{solvers, world::{Settings, World}};
-/// let mut world = World::new(Settings { dt: 0.0, ..Settings::new(solvers::find("shim")?) });
+/// let mut world = World::new(Settings { dt: 0.0, ..Settings::default() });
 /// assert_eq!(world.step().unwrap_err().to_string(), "dt: must be positive and finite, is 0.0");
 /// # Ok::<(), simpulse_engine::error::Error>(())
 /// ```

@@ -7,7 +7,9 @@ use crate::broadphase::Proxy;
 use crate::constraints::kernels::types::ConstraintType;
 use crate::error::Error;
 use crate::shapes::{Aabb, MassProperties, Shape};
-use glam::Vec2;
+use glam::{DVec2, Vec2};
+use std::hash::{BuildHasher, RandomState};
+use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Body slots: which indices are in use.
@@ -37,8 +39,20 @@ impl Slots {
     pub fn new() -> Self {
         /// Far from those of other worlds, however often indices are reused.
         const APART: u32 = 0x9E37_79B9;
-        static NEXT: AtomicU32 = AtomicU32::new(0);
-        Slots { first_generation: NEXT.fetch_add(APART, Ordering::Relaxed), ..Slots::default() }
+        // Random, so that it is far from those of saved worlds and handles, too.
+        static FIRST: LazyLock<u32> = LazyLock::new(|| RandomState::new().hash_one(APART) as u32);
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let apart = COUNT.fetch_add(APART, Ordering::Relaxed);
+        Slots { first_generation: FIRST.wrapping_add(apart), ..Slots::default() }
+    }
+
+    /// The error for a handle with generation `given`, at an index whose last body or joint has generation `now`.
+    pub fn rejects(&self, kind: &'static str, index: usize, given: u32, now: Option<u32>) -> Error {
+        let age = |generation: u32| generation.wrapping_sub(self.first_generation);
+        if now.is_some_and(|now| age(given) < age(now)) {
+            return Error::Removed { kind, index };
+        }
+        Error::invalid(format!("{kind} {index}"), "is the handle of another world")
     }
 }
 
@@ -61,11 +75,11 @@ impl World {
     /// shapes, if there is one. Errors: as [`BodyDef::check`].
     ///
     /// ```
-    /// use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
+    /// use simpulse_engine::prelude::*;
     ///
-    /// let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// let mut world = World::default();
     /// let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
-    /// assert_eq!(world.bodies.origin(ball.index()), [0.0, 2.0]);
+    /// assert_eq!(world.body(ball)?.position(), [0.0, 2.0]);
     /// let heavy = ShapeDef::circle(0.5)?.with_density(-1.0);
     /// let error = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(heavy)).unwrap_err();
     /// assert_eq!(error.to_string(), "shapes[0].density: must be positive, is -1.0");
@@ -96,7 +110,6 @@ impl World {
         }
         self.fat_boxes.set(index, first, &self.shapes[first..first + count as usize]);
         self.traits.add(body, self.bodies.round[index]);
-        self.seams_are_stale |= body.kind == BodyKind::Static;
         self.features = self.traits.features();
         (self.pairs_are_stale, self.continuous_is_stale, self.lanes_are_for) = (true, true, None);
         Ok(BodyHandle { index: index as u32, generation: self.slots.generation[index] })
@@ -150,8 +163,8 @@ impl World {
     /// [`World::add_constraints`] is attached to it.
     ///
     /// ```
-    /// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
-    /// let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// # use simpulse_engine::prelude::*;
+    /// let mut world = World::default();
     /// let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
     /// world.remove_body(ball)?;
     /// assert!(!world.contains(ball));
@@ -200,8 +213,9 @@ impl World {
     /// The index of a body. Errors: the body was removed, or is of another world.
     pub fn index_of(&self, body: BodyHandle) -> Result<usize, Error> {
         let (i, slots) = (body.index(), &self.slots);
-        let is_same = slots.generation.get(i) == Some(&body.generation) && slots.lives[i];
-        if is_same { Ok(i) } else { Err(Error::Removed { body: i }) }
+        let now = slots.generation.get(i).copied();
+        let is_same = now == Some(body.generation) && slots.lives[i];
+        if is_same { Ok(i) } else { Err(slots.rejects("body", i, body.generation, now)) }
     }
 
     /// The handle of the body at an index, as found in contacts and divergences; `None` if the index is not
@@ -222,12 +236,12 @@ impl World {
     /// Errors: the body was removed; a value that is not finite.
     ///
     /// ```
-    /// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
-    /// # let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// # use simpulse_engine::prelude::*;
+    /// # let mut world = World::default();
     /// # let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
     /// world.set_pose(ball, [3.0, 1.0], 0.3)?;
     /// world.set_velocity(ball, [0.0, 5.0], -1.0)?;
-    /// assert_eq!(world.bodies.origin(ball.index()), [3.0, 1.0]);
+    /// assert_eq!(world.body(ball)?.position(), [3.0, 1.0]);
     /// # Ok::<(), simpulse_engine::error::Error>(())
     /// ```
     pub fn set_pose(&mut self, body: BodyHandle, position: [f64; 2], angle: f64) -> Result<(), Error> {
@@ -237,7 +251,6 @@ impl World {
         let center = self.bodies.local_center[i].as_dvec2().to_array();
         self.bodies.place(i, position, angle, center);
         self.fat_boxes.forget(i);
-        self.seams_are_stale |= self.bodies.kind[i] == BodyKind::Static;
         Ok(())
     }
 
@@ -254,15 +267,15 @@ impl World {
     /// Sets the velocity of a body's center of mass (m/s) and its spin (rad/s).
     ///
     /// Errors: the body was removed; it is static; a value that is not finite.
-    pub fn set_velocity(&mut self, body: BodyHandle, velocity: [f32; 2], spin: f32) -> Result<(), Error> {
+    pub fn set_velocity(&mut self, body: BodyHandle, velocity: [f64; 2], spin: f64) -> Result<(), Error> {
         let i = self.index_of(body)?;
-        finite_pair("velocity", velocity.map(f64::from))?;
-        finite("angular_velocity", f64::from(spin))?;
+        finite_pair("velocity", velocity)?;
+        finite("angular_velocity", spin)?;
         if self.bodies.kind[i] == BodyKind::Static {
             return Err(Error::invalid(format!("body {i}"), "is static and has no velocity"));
         }
-        [self.bodies.velocity_x[i], self.bodies.velocity_y[i]] = velocity;
-        self.bodies.angular_velocity[i] = spin;
+        [self.bodies.velocity_x[i], self.bodies.velocity_y[i]] = velocity.map(|x| x as f32);
+        self.bodies.angular_velocity[i] = spin as f32;
         Ok(())
     }
 
@@ -273,23 +286,23 @@ impl World {
     /// Errors: the body was removed; a value that is not finite.
     ///
     /// ```
-    /// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
-    /// # let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// # use simpulse_engine::prelude::*;
+    /// # let mut world = World::default();
     /// # let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
     /// world.apply_force(ball, [500.0, 0.0])?;
     /// world.step()?;
-    /// let speed = world.bodies.velocity_x[ball.index()];
+    /// let speed = world.body(ball)?.velocity()[0];
     /// world.step()?;
-    /// assert_eq!(world.bodies.velocity_x[ball.index()], speed);
+    /// assert_eq!(world.body(ball)?.velocity()[0], speed);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn apply_force(&mut self, body: BodyHandle, force: [f32; 2]) -> Result<(), Error> {
-        self.apply(body, force.into(), 0.0)
+    pub fn apply_force(&mut self, body: BodyHandle, force: [f64; 2]) -> Result<(), Error> {
+        self.apply(body, force, 0.0)
     }
 
     /// Applies a torque (N·m) during the next step only. Errors: as [`World::apply_force`].
-    pub fn apply_torque(&mut self, body: BodyHandle, torque: f32) -> Result<(), Error> {
-        self.apply(body, Vec2::ZERO, torque)
+    pub fn apply_torque(&mut self, body: BodyHandle, torque: f64) -> Result<(), Error> {
+        self.apply(body, [0.0; 2], torque)
     }
 
     /// Changes the velocity of a dynamic body immediately, by an impulse (N·s) at a world point (m).
@@ -297,27 +310,28 @@ impl World {
     /// Errors: the body was removed; a value that is not finite.
     ///
     /// ```
-    /// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
-    /// # let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// # use simpulse_engine::prelude::*;
+    /// # let mut world = World::default();
     /// let plate = ShapeDef::rectangle(1.0, 0.125)?.with_density(2.0);
     /// let plate = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(plate))?;
     /// // 2 N·s upward at the right end of 1 kg: it rises and turns.
     /// world.apply_impulse(plate, [0.0, 2.0], [1.0, 2.0])?;
-    /// assert_eq!(world.bodies.velocity_y[plate.index()], 2.0);
-    /// assert!(world.bodies.angular_velocity[plate.index()] > 5.0);
+    /// assert_eq!(world.body(plate)?.velocity()[1], 2.0);
+    /// assert!(world.body(plate)?.spin() > 5.0);
     /// # Ok::<(), simpulse_engine::error::Error>(())
     /// ```
     pub fn apply_impulse(
         &mut self,
         body: BodyHandle,
-        impulse: [f32; 2],
+        impulse: [f64; 2],
         point: [f64; 2],
     ) -> Result<(), Error> {
         let i = self.index_of(body)?;
-        finite_pair("impulse", impulse.map(f64::from))?;
+        finite_pair("impulse", impulse)?;
         finite_pair("point", point)?;
         let [x, y] = self.bodies.center(i);
-        let (arm, impulse) = (Vec2::new((point[0] - x) as f32, (point[1] - y) as f32), Vec2::from(impulse));
+        let arm = Vec2::new((point[0] - x) as f32, (point[1] - y) as f32);
+        let impulse = DVec2::from(impulse).as_vec2();
         let b = &mut self.bodies;
         b.velocity_x[i] += b.inv_mass[i] * impulse.x;
         b.velocity_y[i] += b.inv_mass[i] * impulse.y;
@@ -325,10 +339,10 @@ impl World {
         Ok(())
     }
 
-    fn apply(&mut self, body: BodyHandle, force: Vec2, torque: f32) -> Result<(), Error> {
+    fn apply(&mut self, body: BodyHandle, force: [f64; 2], torque: f64) -> Result<(), Error> {
         let i = self.index_of(body)?;
-        finite_pair("force", [force.x, force.y].map(f64::from))?;
-        finite("torque", f64::from(torque))?;
+        finite_pair("force", force)?;
+        finite("torque", torque)?;
         let b = &mut self.bodies;
         let standing = StandingForces {
             body: body.index,
@@ -336,9 +350,9 @@ impl World {
             torque: b.torque[i],
         };
         self.applied.push(standing);
-        b.force_x[i] += force.x;
-        b.force_y[i] += force.y;
-        b.torque[i] += torque;
+        b.force_x[i] += force[0] as f32;
+        b.force_y[i] += force[1] as f32;
+        b.torque[i] += torque as f32;
         Ok(())
     }
 

@@ -3,12 +3,12 @@
 use super::World;
 use crate::bodies::BodyHandle;
 use crate::contacts::Contact;
-use crate::error::Error;
 use crate::params::HIT_SPEED;
 use glam::{DVec2, Vec2};
 
 /// A contact event in the last step. Bodies and shapes are in the order of the [`Contact`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum ContactEvent {
     /// Two shapes came within [`SPECULATIVE_DISTANCE`](crate::params::SPECULATIVE_DISTANCE), at which
     /// contacts begin.
@@ -35,27 +35,28 @@ pub enum ContactEvent {
         /// Mean of the contact points (m).
         point: [f64; 2],
         /// Unit vector from the first body to the second.
-        normal: Vec2,
+        normal: [f64; 2],
         /// Approach speed along the normal before the step (m/s), > 0.
-        approach_speed: f32,
+        approach_speed: f64,
         /// Normal impulse of the whole step, summed over all points (N·s).
-        impulse: f32,
+        impulse: f64,
     },
 }
 
 /// A contact point in world coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ContactPoint {
     /// Position (m): the center of body b plus the arm found at the start of the last step.
     pub position: [f64; 2],
     /// Unit vector from body a to body b.
-    pub normal: Vec2,
+    pub normal: [f64; 2],
     /// Signed gap along the normal (m); negative is overlap.
-    pub separation: f32,
+    pub separation: f64,
     /// Normal impulse of the last substep, ≥ 0 (N·s).
-    pub normal_impulse: f32,
+    pub normal_impulse: f64,
     /// Tangential impulse of the last substep (N·s).
-    pub tangent_impulse: f32,
+    pub tangent_impulse: f64,
 }
 
 /// A pair of touching shapes.
@@ -90,7 +91,7 @@ impl World {
     /// use simpulse_engine::bodies::{BodyDef, ShapeDef};
     /// use simpulse_engine::{solvers, world::{ContactEvent, Settings, World}};
     ///
-    /// let settings = Settings { contact_events: true, ..Settings::new(solvers::find("shim")?) };
+    /// let settings = Settings { contact_events: true, ..Settings::default() };
     /// let mut world = World::new(settings);
     /// world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(10.0, 1.0)?))?;
     /// world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
@@ -111,28 +112,10 @@ impl World {
         &self.events.list
     }
 
-    /// Contacts of a body in the last step, found by a search through all contacts. Errors: the body was
-    /// removed.
-    ///
-    /// ```
-    /// # use simpulse_engine::{bodies::{BodyDef, ShapeDef}, solvers, world::{Settings, World}};
-    /// # let mut world = World::new(Settings::new(solvers::find("shim")?));
-    /// # world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(10.0, 1.0)?))?;
-    /// let crate_ = world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::rectangle(0.5, 0.5)?))?;
-    /// for _ in 0..60 {
-    ///     world.step()?;
-    /// }
-    /// // The normal impulse of a substep ÷ its length is the force: the weight of the box.
-    /// let h = world.settings.h();
-    /// let points = world.contacts_of(crate_)?.flat_map(|contact| world.points_of(contact));
-    /// let force: f32 = points.map(|point| point.normal_impulse / h).sum();
-    /// let mass = 1.0 / world.bodies.inv_mass[crate_.index()];
-    /// assert!((force / (10.0 * mass) - 1.0).abs() < 1e-3, "{force} N on {mass} kg");
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn contacts_of(&self, body: BodyHandle) -> Result<impl Iterator<Item = &Contact>, Error> {
-        let i = self.index_of(body)? as u32;
-        Ok(self.contacts.iter().filter(move |c| c.body_a == i || c.body_b == i))
+    /// Bodies a and b of a contact of the last step.
+    pub fn bodies_of(&self, contact: &Contact) -> [BodyHandle; 2] {
+        let handle = |index| BodyHandle { index, generation: self.slots.generation[index as usize] };
+        [contact.body_a, contact.body_b].map(handle)
     }
 
     /// The points of a contact of the last step, in world coordinates.
@@ -140,10 +123,10 @@ impl World {
         let [x, y] = self.bodies.center(contact.body_b as usize);
         contact.manifold.points().iter().map(move |point| ContactPoint {
             position: [x + f64::from(point.anchor_b.x), y + f64::from(point.anchor_b.y)],
-            normal: contact.manifold.normal,
-            separation: point.separation,
-            normal_impulse: point.normal_impulse,
-            tangent_impulse: point.tangent_impulse,
+            normal: contact.manifold.normal.as_dvec2().to_array(),
+            separation: point.separation.into(),
+            normal_impulse: point.normal_impulse.into(),
+            tangent_impulse: point.tangent_impulse.into(),
         })
     }
 
@@ -171,10 +154,9 @@ impl World {
         events.list.clear();
         events.touching.clear();
         events.touching.extend(self.contacts.iter().map(|contact| {
-            let handle = |index| BodyHandle { index, generation: self.slots.generation[index as usize] };
             TouchingPair {
                 key: contact.key(),
-                bodies: [contact.body_a, contact.body_b].map(handle),
+                bodies: self.bodies_of(contact),
                 shapes: [contact.shape_a, contact.shape_b],
             }
         }));
@@ -197,7 +179,8 @@ impl World {
             }
             let impulse = contact.step_impulse[0][0] + contact.step_impulse[1][0];
             if approach_speed > HIT_SPEED * self.settings.length_unit && impulse > 0.0 {
-                let (normal, point) = (contact.manifold.normal, point.to_array());
+                let (normal, point) = (contact.manifold.normal.as_dvec2().to_array(), point.to_array());
+                let (approach_speed, impulse) = (approach_speed.into(), impulse.into());
                 list.push(ContactEvent::Hit { bodies, shapes, point, normal, approach_speed, impulse });
             }
         }

@@ -134,12 +134,12 @@ impl World {
         Ok(())
     }
 
-    /// The definition of a joint, with its frames. Errors: the joint was removed.
+    /// The definition of a joint, with its frames. Errors: the joint was removed, or is of another world.
     pub fn joint(&self, handle: JointHandle) -> Result<&Joint, Error> {
-        let index = handle.index();
-        let is_same = self.joints.generation.get(index) == Some(&handle.generation);
-        let joint = self.joints.joints.get(index).and_then(Option::as_ref).filter(|_| is_same);
-        joint.ok_or_else(|| Error::invalid(format!("joint {index}"), "was removed"))
+        let (index, slots) = (handle.index(), &self.joints);
+        let now = slots.generation.get(index).copied();
+        let joint = slots.joints.get(index).and_then(Option::as_ref).filter(|_| now == Some(handle.generation));
+        joint.ok_or_else(|| self.slots.rejects("joint", index, handle.generation, now))
     }
 
     /// All joints, with their handles.
@@ -151,7 +151,16 @@ impl World {
         )
     }
 
-    /// Position errors and load of a joint after the last step. Errors: the joint was removed.
+    /// Joints of a body, with their handles.
+    pub(super) fn joints_of(&self, body: BodyHandle) -> impl Iterator<Item = (JointHandle, &Joint)> {
+        let JointSlots { joints, generation, of_body, .. } = &self.joints;
+        of_body.range([body.index, 0]..=[body.index, u32::MAX]).filter_map(|&[_, index]| {
+            let handle = JointHandle { index, generation: generation[index as usize] };
+            joints[index as usize].as_ref().map(|joint| (handle, joint))
+        })
+    }
+
+    /// Position errors and load of a joint after the last step. Errors: the joint was removed, or is of another world.
     pub fn joint_state(&self, handle: JointHandle) -> Result<JointState, Error> {
         let joint = self.joint(handle)?;
         let ends = [joint.a.index(), joint.b.index()];
@@ -166,16 +175,19 @@ impl World {
         let angle = angle - reference(&joint.kind);
         let turns = ((last - angle) / std::f64::consts::TAU).round();
         let angle = angle + turns * std::f64::consts::TAU;
-        let mut state = joint.kind.measure(&measured(&self.bodies, ends, joint.kind.anchors(), angle));
+        let at = measured(&self.bodies, ends, joint.kind.anchors(), angle);
+        let mut state = joint.kind.measure(&at);
         if !kept.is_empty() {
-            state.load = joint.kind.load(kept).map(|impulse| impulse / f64::from(self.settings.h()));
+            let ((linear, angular), h) = (joint.kind.impulse(kept, &at), f64::from(self.settings.h()));
+            (state.force, state.torque) = ((linear / h).to_array(), angular / h);
         }
-        state.breaks = joint.break_load.is_some_and(|most| (0..2).any(|k| state.load[k] > most[k]));
+        let load = state.load();
+        state.breaks = joint.break_load.is_some_and(|most| (0..2).any(|k| load[k] > most[k]));
         Ok(state)
     }
 
     /// Impulses of a joint in the last step, with `Settings::record_impulses`; `None` without it, or if the
-    /// joint was added since. Errors: the joint was removed.
+    /// joint was added since. Errors: the joint was removed, or is of another world.
     pub fn joint_impulses(&self, handle: JointHandle) -> Result<Option<RecordedImpulses>, Error> {
         self.joint(handle)?;
         let place = self.joints.places[handle.index()];

@@ -49,10 +49,9 @@ impl World {
     /// time. `None` for contacts that are solved one by one.
     ///
     /// ```
-    /// use simpulse_engine::bodies::{BodyDef, ShapeDef};
-    /// use simpulse_engine::{solvers, world::{Settings, World}};
+    /// use simpulse_engine::prelude::*;
     ///
-    /// let mut world = World::new(Settings::new(solvers::find("soft_step")?));
+    /// let mut world = World::new(Settings::new(solvers::SOFT_STEP));
     /// world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(9.0, 1.0)?))?;
     /// for y in [0.5, 1.5, 2.5] {
     ///     world.add_body(&BodyDef::dynamic([0.0, y]).with(ShapeDef::rectangle(0.5, 0.5)?))?;

@@ -27,6 +27,7 @@ use joints::JointSlots;
 use std::fmt;
 use traits::Traits;
 
+mod body;
 mod candidates;
 mod collide;
 mod counts;
@@ -41,6 +42,7 @@ mod saved;
 mod settings;
 mod traits;
 
+pub use body::Body;
 pub use counts::{Criterion, Divergence, Quantity, StepCounts, StepError};
 pub use events::{ContactEvent, ContactPoint};
 pub use joints::SolvedBlock;
@@ -74,7 +76,7 @@ struct Surface {
 /// // A stack, at one lane and at the widest: the same bits.
 /// let mut hashes = Vec::new();
 /// for width in [LaneWidth::W1, LaneWidth::W16] {
-///     let settings = Settings::new(solvers::find("soft_step")?).exactly(width);
+///     let settings = Settings::new(solvers::SOFT_STEP).exactly(width);
 ///     let mut world = World::new(settings);
 ///     let (floor, cube) = (ShapeDef::rectangle(50.0, 1.0)?, ShapeDef::rectangle(0.5, 0.5)?);
 ///     world.add_body(&BodyDef::fixed([0.0, -1.0]).with(floor))?;
@@ -152,6 +154,13 @@ impl fmt::Debug for World {
             .field("shapes", &self.shapes.len())
             .field("contacts", &self.contacts.len())
             .finish_non_exhaustive()
+    }
+}
+
+/// An empty world with [`Settings::default`].
+impl Default for World {
+    fn default() -> Self {
+        World::new(Settings::default())
     }
 }
 

@@ -19,6 +19,7 @@ use glam::{DVec2, Vec2};
 
 /// The first point where a ray meets a shape. Distances have a relative accuracy of 10⁻⁷.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct RayHit {
     /// The body.
     pub body: BodyHandle,
@@ -27,7 +28,7 @@ pub struct RayHit {
     /// Hit point (m).
     pub point: [f64; 2],
     /// Outward unit normal of the shape; opposite to the ray if the ray starts inside.
-    pub normal: Vec2,
+    pub normal: [f64; 2],
     /// Distance from the start of the ray (m); 0 if the ray starts inside.
     pub distance: f64,
 }
@@ -42,20 +43,23 @@ const MOST_ADVANCES: u32 = 64;
 /// Bounds are `f32`: a query's region is enlarged by this fraction of its coordinates.
 const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
-/// Queries on the current positions. [`World::queries`] updates the tree once for many queries.
+/// Queries on the current positions. [`World::queries`] prepares many of them at once.
+///
+/// The tree has the bounds of the last step. Bodies that have left theirs since are tested one by one.
 #[derive(Debug)]
 pub struct Queries<'w> {
     world: &'w World,
+    /// Shapes of bodies that may have left their bounds, with their current ones.
+    strays: Vec<(u32, Aabb)>,
 }
 
 impl World {
     /// Prepares queries on the current positions. They do not change the bits of later steps.
     ///
     /// ```
-    /// use simpulse_engine::bodies::{BodyDef, ShapeDef};
-    /// use simpulse_engine::{solvers, world::{Settings, World}};
+    /// use simpulse_engine::prelude::*;
     ///
-    /// let mut world = World::new(Settings::new(solvers::find("shim")?));
+    /// let mut world = World::default();
     /// let ball = world.add_body(&BodyDef::dynamic([0.0, 2.0]).with(ShapeDef::circle(0.5)?))?;
     /// let queries = world.queries();
     /// let hit = queries.ray_cast([0.0, 10.0], [0.0, -1.0])?.expect("the ball is below");
@@ -66,13 +70,19 @@ impl World {
     /// assert_eq!(queries.bodies_in([0.45, 0.0], [3.0, 1.6])?, []);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn queries(&mut self) -> Queries<'_> {
-        self.update_pairs();
-        Queries { world: self }
+    pub fn queries(&self) -> Queries<'_> {
+        let mut strays = Vec::new();
+        self.fat_boxes.failing(&self.bodies, |body| {
+            let first = self.slots.first_shape[body] as usize;
+            let shapes = first..first + self.slots.shapes[body] as usize;
+            let pose = self.bodies.pose(body);
+            strays.extend(shapes.map(|i| (i as u32, self.shapes[i].aabb(&pose))));
+        });
+        Queries { world: self, strays }
     }
 
     /// One ray cast, see [`Queries::ray_cast`].
-    pub fn ray_cast(&mut self, from: [f64; 2], direction: [f64; 2]) -> Result<Option<RayHit>, Error> {
+    pub fn ray_cast(&self, from: [f64; 2], direction: [f64; 2]) -> Result<Option<RayHit>, Error> {
         self.queries().ray_cast(from, direction)
     }
 }
@@ -111,7 +121,7 @@ impl Queries<'_> {
             let is_better = best.is_none_or(|hit| (distance, shape) < (hit.distance, hit.shape));
             if is_better && filter(body) {
                 let point = (origin + distance * along).to_array();
-                best = Some(RayHit { body, shape, point, normal: normal.as_vec2(), distance });
+                best = Some(RayHit { body, shape, point, normal: normal.to_array(), distance });
                 region.shorten(distance as f32);
             }
         });
@@ -154,11 +164,17 @@ impl Queries<'_> {
     /// Calls `visit` with each shape whose bounds overlap the region, and with its body.
     fn visit(&self, region: &mut Region, mut visit: impl FnMut(&mut Region, usize, BodyHandle)) {
         let World { broadphase, proxies, .. } = self.world;
-        broadphase.visit(proxies, region, |region, shape| {
+        let mut visit = |region: &mut Region, shape: u32| {
             if let Some(body) = self.world.handle(self.world.shape_body[shape as usize] as usize) {
                 visit(region, shape as usize, body);
             }
-        });
+        };
+        broadphase.visit(proxies, region, &mut visit);
+        for &(shape, aabb) in &self.strays {
+            if region.meets(&aabb.grown(ROUNDING * aabb.min.abs().max(aabb.max.abs()).max_element())) {
+                visit(region, shape);
+            }
+        }
     }
 
     /// Distance (m) of shape `i` from `other` at `center`, minus both radii, and the unit vector toward it; a

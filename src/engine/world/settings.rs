@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::lanes::{LaneWidth, native_width};
 use crate::narrowphase::frozen::{FreezeLimits, Freezing};
 use crate::params::{Budget, Parameters, Without};
-use crate::solvers::Variant;
+use crate::solvers::{self, Variant};
 
 /// The order in which constraints are solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -53,8 +53,8 @@ impl Order {
 ///
 /// let mut settings = Settings {
 ///     gravity: [0.0, -1.6],
-///     budget: Budget { substeps: 8, ..solvers::find("soft_step")?.budget },
-///     ..Settings::new(solvers::find("soft_step")?)
+///     budget: Budget { substeps: 8, ..solvers::SOFT_STEP.budget },
+///     ..Settings::new(solvers::SOFT_STEP)
 /// };
 /// // A parameter of the solver's own, by name; its range is checked.
 /// settings.solver.set(&mut settings.parameters, "contact_hertz", 60.0)?;
@@ -121,6 +121,13 @@ pub struct Settings {
     pub threads: usize,
     /// Extra kernel features to compile in, to measure their cost.
     pub extra_features: Features,
+}
+
+/// Standard settings of [`solvers::SHIM`], the solver that fails least.
+impl Default for Settings {
+    fn default() -> Self {
+        Settings::new(solvers::SHIM)
+    }
 }
 
 impl Settings {

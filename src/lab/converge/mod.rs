@@ -208,7 +208,7 @@ impl IteratedSchedule {
 /// reference that is not a solution.
 ///
 /// ```
-/// use simpulse::engine::solvers::find;
+/// use simpulse::solvers::find;
 /// use simpulse::lab::converge::{ConvergeOptions, converge};
 /// use simpulse::lab::reference::gallery;
 ///

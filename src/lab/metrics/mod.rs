@@ -22,13 +22,13 @@
 //! of JSON files, the lines of `run --all` and of `list columns` follow. Outside the crate it is a function of a world:
 //!
 //! ```
-//! use simpulse::engine::world::{Settings, World};
-//! use simpulse::engine::{solvers, bodies::BodyKind};
+//! use simpulse::world::{Settings, World};
+//! use simpulse::{solvers, bodies::BodyKind};
 //! use simpulse::lab::scenes;
 //!
 //! /// Height of the highest body (m).
 //! fn height(world: &World) -> f64 {
-//!     let dynamic = (0..world.bodies.len()).filter(|&i| world.bodies.kind[i] == BodyKind::Dynamic);
+//!     let dynamic = (0..world.bodies.len()).filter(|&i| world.bodies.kind(i) == BodyKind::Dynamic);
 //!     dynamic.map(|i| world.bodies.origin(i)[1]).fold(0.0, f64::max)
 //! }
 //!
@@ -77,7 +77,7 @@ const FLIGHT: f64 = 0.5;
 /// Observes a world step by step and accumulates its errors.
 ///
 /// ```
-/// use simpulse::engine::{solvers, world::Settings};
+/// use simpulse::{solvers, world::Settings};
 /// use simpulse::lab::{metrics::Observation, scenes};
 ///
 /// let scene = scenes::load("pyramid:4")?.scene;
@@ -276,7 +276,7 @@ impl Observation {
         let loaded = contact.manifold.points().iter().zip(own).find(|(p, _)| p.feature_id == feature);
         let Some((_, (_, point))) = loaded else { return 0.0 };
         let [a, b] = [contact.body_a, contact.body_b].map(|i| &self.previous[i as usize]);
-        let omega = softness[(world.bodies.kind[contact.body_a as usize] != BodyKind::Dynamic) as usize];
+        let omega = softness[(world.bodies.kind(contact.body_a as usize) != BodyKind::Dynamic) as usize];
         softness::floor(point.impulse[0] / self.dt, point.effective_mass(point.normal, a, b), omega)
     }
 

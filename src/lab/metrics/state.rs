@@ -34,7 +34,7 @@ impl BodyState {
         let wide = |v: Vec2| v.as_dvec2();
         let pose = bodies.pose(i);
         let mut state = BodyState {
-            kind: bodies.kind[i],
+            kind: bodies.kind(i),
             inv_mass: bodies.inv_mass[i] as f64,
             inv_inertia: bodies.inv_inertia[i] as f64,
             position: DVec2::from(bodies.center(i)),

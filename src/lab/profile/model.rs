@@ -105,7 +105,7 @@ const MANIFOLD: f64 = 16.0 * (quad::HEADER + 1) as f64;
 pub fn of(world: &mut World, phase: Phase) -> Option<PassWork> {
     let (features, solver) = (world.features(), world.settings.solver.name);
     let bodies = world.bodies.len() as f64;
-    let moving = world.bodies.kind.iter().filter(|&&kind| kind != BodyKind::Static).count() as f64;
+    let moving = (0..world.bodies.len()).filter(|&i| world.bodies.kind(i) != BodyKind::Static).count() as f64;
     let (contacts, counts) = (world.contacts.len() as f64, world.counts);
     let proxies = (size_of::<Proxy>() * world.shapes().len()) as f64;
     let work = world.workspace();

@@ -21,7 +21,7 @@ pub const DEFAULT_STEPS: u32 = 300;
 /// Scenes are written in code or read from JSON (`simpulse list NAME --json` prints one):
 ///
 /// ```
-/// use simpulse::engine::{solvers, world::Settings};
+/// use simpulse::{solvers, world::Settings};
 /// use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 ///
 /// let ground = SceneBody::fixed([0.0, -1.0], SceneShape::rectangle(20.0, 1.0));

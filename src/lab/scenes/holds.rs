@@ -291,7 +291,7 @@ impl Walls {
         let mut edges = Vec::new();
         for (shape, &body) in world.shapes().iter().zip(world.shape_body()) {
             let i = body as usize;
-            if one.map_or(bodies.kind[i] != BodyKind::Static, |own| own != i) {
+            if one.map_or(bodies.kind(i) != BodyKind::Static, |own| own != i) {
                 continue;
             }
             let frame = if one.is_some() { BodyFrame::default() } else { BodyFrame::of(world, i) };
@@ -365,7 +365,7 @@ struct MovingWalls {
 
 impl MovingWalls {
     fn all(world: &World) -> Vec<Self> {
-        let kinematic = (0..world.bodies.len()).filter(|&i| world.bodies.kind[i] == BodyKind::Kinematic);
+        let kinematic = (0..world.bodies.len()).filter(|&i| world.bodies.kind(i) == BodyKind::Kinematic);
         let of = |body| MovingWalls {
             body,
             walls: Walls::of(world, Some(body)),

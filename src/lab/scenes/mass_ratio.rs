@@ -79,8 +79,7 @@ mod tests {
     #[test]
     fn the_load_counts_only_while_the_heavy_disc_is_on_top() {
         let error = |heavy: f32, impulse: f32| {
-            let mut bodies = by_hand::bodies(&[[0.0, 0.0], [0.0, 0.5], [0.0, heavy]]);
-            bodies.kind[0] = BodyKind::Static;
+            let bodies = by_hand::on_static(&[[0.0, 0.0], [0.0, 0.5], [0.0, heavy]]);
             let manifold = Manifold { normal: Vec2::Y, count: 1, ..Default::default() };
             let step_impulse = [[impulse, 0.0], [0.0, 0.0]];
             let contacts = [Contact { body_b: 1, manifold, step_impulse, ..Default::default() }];

@@ -169,8 +169,7 @@ mod tests {
 
     #[test]
     fn below_the_floor_are_dynamic_bodies_and_nan() {
-        let mut bodies = by_hand::bodies(&[[0.0, -1.0], [0.0, 0.5], [0.0, -0.1], [0.0, f32::NAN]]);
-        bodies.kind[0] = BodyKind::Static;
+        let bodies = by_hand::on_static(&[[0.0, -1.0], [0.0, 0.5], [0.0, -0.1], [0.0, f32::NAN]]);
         assert_eq!(outside(&by_hand::view(&bodies, 1), above_floor), 2);
     }
 }

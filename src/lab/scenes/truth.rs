@@ -182,7 +182,7 @@ pub(super) fn ground_load(view: &View) -> Option<f64> {
     if !view.impulses {
         return None;
     }
-    let on_ground = |c: &&Contact| view.bodies.kind[c.body_a as usize] == BodyKind::Static;
+    let on_ground = |c: &&Contact| view.bodies.kind(c.body_a as usize) == BodyKind::Static;
     let upward = |c: &Contact| {
         let count = (c.manifold.count as usize).min(2);
         let normal: f64 = c.step_impulse[..count].iter().map(|i| f64::from(i[0])).sum();
@@ -253,21 +253,24 @@ pub(super) mod by_hand {
     //! States made by hand, for tests of observers.
 
     use super::*;
+    use crate::engine::bodies::BodyDef;
+    use crate::engine::shapes::MassProperties;
 
     /// Dynamic bodies at centers (m), at rest.
     pub fn bodies(centers: &[[f32; 2]]) -> Bodies {
+        of_kinds(centers.iter().map(|&at| (BodyKind::Dynamic, at)))
+    }
+
+    /// As [`bodies`], with a static first one.
+    pub fn on_static(centers: &[[f32; 2]]) -> Bodies {
+        let kind = |i: usize| if i == 0 { BodyKind::Static } else { BodyKind::Dynamic };
+        of_kinds(centers.iter().enumerate().map(|(i, &at)| (kind(i), at)))
+    }
+
+    fn of_kinds(all: impl Iterator<Item = (BodyKind, [f32; 2])>) -> Bodies {
         let mut bodies = Bodies::default();
-        for &[x, y] in centers {
-            bodies.position_x.push(x);
-            bodies.position_y.push(y);
-            bodies.position_x_lo.push(0.0);
-            bodies.position_y_lo.push(0.0);
-            bodies.rotation_cos.push(1.0);
-            bodies.rotation_sin.push(0.0);
-            bodies.velocity_x.push(0.0);
-            bodies.velocity_y.push(0.0);
-            bodies.angular_velocity.push(0.0);
-            bodies.kind.push(BodyKind::Dynamic);
+        for (kind, at) in all {
+            bodies.push(&BodyDef::new(kind, at.map(f64::from), Vec::new()), &MassProperties::ZERO);
         }
         bodies
     }
@@ -326,8 +329,7 @@ mod tests {
 
     #[test]
     fn the_ground_load_sums_points_on_static_bodies_only() {
-        let mut bodies = by_hand::bodies(&[[0.0, 0.0], [0.0, 0.5], [0.0, 1.5]]);
-        bodies.kind[0] = BodyKind::Static;
+        let bodies = by_hand::on_static(&[[0.0, 0.0], [0.0, 0.5], [0.0, 1.5]]);
         let contact = |body_a, body_b, count, impulses: [f32; 2]| Contact {
             body_a,
             body_b,

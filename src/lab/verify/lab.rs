@@ -229,7 +229,7 @@ pub(super) fn gaps(world: &World) -> impl Iterator<Item = f64> + '_ {
 /// Force (N) and torque (N·m) of joint `i`, in order of addition, in the last substep.
 pub(super) fn joint_load(world: &World, i: usize) -> [f64; 2] {
     let handle = world.joints().nth(i).map(|(handle, _)| handle);
-    handle.and_then(|handle| world.joint_state(handle).ok()).map_or([f64::NAN; 2], |state| state.load)
+    handle.and_then(|handle| world.joint_state(handle).ok()).map_or([f64::NAN; 2], |state| state.load())
 }
 
 /// Mass of all dynamic bodies (kg).

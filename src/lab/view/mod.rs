@@ -5,7 +5,7 @@
 //! panes, [`Session::frame`] is their state in bytes. The same requests at the same steps give the same bits.
 //!
 //! ```
-//! use simpulse::engine::{solvers, world::Settings};
+//! use simpulse::{solvers, world::Settings};
 //! use simpulse::lab::view::{Request, Session, Source};
 //!
 //! let settings = ["pgs", "shim"].map(|name| solvers::find(name).map(Settings::new));

@@ -74,13 +74,13 @@ impl Session {
 
     /// Drops a box with its center at `at`.
     pub(super) fn drop_box(&mut self, at: [f64; 2]) -> Result<(), Error> {
-        let half = 0.5 * tolerance::size(&self.panes[0].loaded.scene) as f32;
+        let half = 0.5 * tolerance::size(&self.panes[0].loaded.scene);
         self.add(at, [0.0; 2], ShapeDef::rectangle(half, half)?, 1.0)
     }
 
     /// Throws a ball of twice the density.
     pub(super) fn throw_ball(&mut self, at: [f64; 2], velocity: [f64; 2]) -> Result<(), Error> {
-        let radius = 0.5 * tolerance::size(&self.panes[0].loaded.scene) as f32;
+        let radius = 0.5 * tolerance::size(&self.panes[0].loaded.scene);
         self.add(at, within("velocity", velocity)?.to_array(), ShapeDef::circle(radius)?, 2.0)
     }
 
@@ -152,8 +152,8 @@ impl Pane {
         let pull = (omega * omega * offset - 2.0 * omega * velocity) / inverse;
         let force = pull.clamp_length_max(STRONGEST * gravity(&self.world) / f64::from(b.inv_mass[i]));
         let world = self.touch();
-        world.apply_force(body, force.as_vec2().to_array())?;
-        world.apply_torque(body, arm.perp_dot(force) as f32)?;
+        world.apply_force(body, force.to_array())?;
+        world.apply_torque(body, arm.perp_dot(force))?;
         Ok(())
     }
 }

@@ -30,9 +30,9 @@ use std::fmt;
 use std::ops::DerefMut;
 
 /// A type of joint between two bodies. `tests/engine/joints.rs` defines one outside the crate.
-pub trait JointType: Clone + fmt::Debug + Send + 'static {
+pub trait JointType: Clone + fmt::Debug + Send + Sync + 'static {
     /// Which rows a joint has. Joints of one form are solved together.
-    type Form: Copy + fmt::Debug + Send;
+    type Form: Copy + fmt::Debug + Send + Sync;
 
     /// Anchors in the frames of a and b (m).
     fn anchors(&self) -> [[f64; 2]; 2];

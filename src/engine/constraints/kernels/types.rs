@@ -133,7 +133,7 @@ impl RowStore for TypeRows<'_> {
 ///     }
 /// }
 ///
-/// let mut world = World::new(Settings::new(solvers::find("pgs")?));
+/// let mut world = World::new(Settings::new(solvers::PGS));
 /// let [a, b] = [0.0, 3.0].map(|x| BodyDef::dynamic([x, 0.0]).with(ShapeDef::circle(0.5).unwrap()));
 /// let [a, b] = [world.add_body(&a)?, world.add_body(&b)?];
 /// world.add_constraints(Box::new(Idle(vec![[a.index() as u32, b.index() as u32]])));
@@ -142,7 +142,7 @@ impl RowStore for TypeRows<'_> {
 /// assert!(world.remove_body(a).is_err());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub trait ConstraintType: Any + fmt::Debug + Send {
+pub trait ConstraintType: Any + fmt::Debug + Send + Sync {
     /// Bodies a and b of each constraint; b is dynamic.
     fn ends(&self) -> &[[u32; 2]];
 

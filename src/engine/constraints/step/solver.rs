@@ -14,7 +14,7 @@ use std::fmt;
 ///
 /// The world calls the hooks in the order in which they are listed. Most solvers are a [`Schedule`] and
 /// nothing else.
-pub trait Solver: CloneSolver + fmt::Debug + Send {
+pub trait Solver: CloneSolver + fmt::Debug + Send + Sync {
     /// Called before candidates are collided. The contacts are those of the last step.
     fn before_collision(&mut self, _scene: &mut CollisionScene<'_>, _collision: &mut Collision) {}
 

@@ -50,7 +50,7 @@ pub struct Workspace {
 pub struct Watch(pub Box<IterationObserver>);
 
 /// Receives the number of an iteration, and the problem after it.
-pub type IterationObserver = dyn FnMut(u32, &mut System<'_>) + Send;
+pub type IterationObserver = dyn FnMut(u32, &mut System<'_>) + Send + Sync;
 
 impl fmt::Debug for Watch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
