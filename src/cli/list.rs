@@ -184,7 +184,8 @@ fn described(loaded: &Loaded) -> String {
     ];
     for (name, line) in lines {
         let Some((Tolerance { value, reason, fixed }, unit)) = line else { continue };
-        let value = if unit == "%" { format!("{} of a body's weight", percent(value)) } else { si(value, unit) };
+        let value =
+            if unit == "%" { format!("{} of a body's weight", percent(value)) } else { si(value, unit) };
         let fixed = if fixed { " (at every accuracy)" } else { "" };
         text += &format!("  {name:<12} {value}: {reason}{fixed}\n");
     }

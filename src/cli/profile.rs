@@ -38,7 +38,13 @@ pub struct ProfileArgs {
     #[arg(value_name = "SCENE", num_args = 1.., required = true, value_parser = values::scene(), help = scene_help())]
     pub scenes: Vec<String>,
     /// Duration of the measurement of a scene (s)
-    #[arg(help_heading = "Measuring", long, default_value_t = 5.0, value_name = "S", allow_negative_numbers = true)]
+    #[arg(
+        help_heading = "Measuring",
+        long,
+        default_value_t = 5.0,
+        value_name = "S",
+        allow_negative_numbers = true
+    )]
     pub seconds: f64,
     /// Solver, budget and parameters
     #[command(flatten)]

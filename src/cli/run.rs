@@ -277,7 +277,8 @@ impl RunResult {
             let why = "of steps: too many points for the solver's own method".into();
             lines.push(("solved by sweeps alone", format!("{:.0} %", 100.0 * sample.load.unsolved), why));
         }
-        let name = if self.rests { "overlap, 99 % and at rest" } else { "overlap that the solver left, 99 %" };
+        let name =
+            if self.rests { "overlap, 99 % and at rest" } else { "overlap that the solver left, 99 %" };
         let [most, first] = ["penetration_max_m", "flight_depth_max_m"].map(|name| si(at(name), "m"));
         lines.extend([
             ("error", String::new(), String::new()),

@@ -45,7 +45,9 @@ fn text(bytes: &[u8]) -> &str {
 
 /// Standard error without progress and without the line that warns of a build that does not use the CPU's lanes.
 fn errors(output: &Output) -> String {
-    let lines = text(&output.stderr).lines().filter(|line| !["this CPU has ", "progress: "].iter().any(|own| line.starts_with(own)));
+    let lines = text(&output.stderr)
+        .lines()
+        .filter(|line| !["this CPU has ", "progress: "].iter().any(|own| line.starts_with(own)));
     lines.map(|line| format!("{line}\n")).collect()
 }
 

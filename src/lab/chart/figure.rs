@@ -36,7 +36,9 @@ impl FigureStyle {
         let refused = |why: &str| Error::invalid("--figure", format!("'{size}' {why}"));
         let length = |text: &str| -> Result<f64, Error> {
             let units = [("mm", 1.0), ("cm", 10.0), ("in", 25.4)];
-            let found = units.iter().find_map(|(unit, mm)| Some(text.trim().strip_suffix(unit)?.trim().parse::<f64>().ok()? * mm));
+            let found = units.iter().find_map(|(unit, mm)| {
+                Some(text.trim().strip_suffix(unit)?.trim().parse::<f64>().ok()? * mm)
+            });
             found.filter(|mm| (WIDTHS[0]..=WIDTHS[1]).contains(mm)).ok_or_else(|| {
                 refused("is no width such as 85mm, or width and height such as 85mmx60mm, from 40 to 400 mm")
             })
@@ -48,7 +50,8 @@ impl FigureStyle {
         if !(POINTS[0]..=POINTS[1]).contains(&points) {
             return Err(Error::invalid("--font-size", format!("{points} is not from 4 to 24 pt")));
         }
-        let style = FigureStyle { width_mm: length(width)?, height_mm: height, font: font.to_string(), points };
+        let style =
+            FigureStyle { width_mm: length(width)?, height_mm: height, font: font.to_string(), points };
         if style.pixels(style.width_mm) < LEAST || style.pixels(style.height()) < LEAST {
             return Err(refused(&format!("leaves no room for a plot with type of {points} pt")));
         }
@@ -94,9 +97,11 @@ mod tests {
 
     #[test]
     fn a_figure_has_its_width_and_type_and_no_variables() {
-        let marks = vec![ChartMark::at(1.0, 2.0, 3.0, "here".into()), ChartMark::at(3.0, 1.0, 3.0, String::new())];
+        let marks =
+            vec![ChartMark::at(1.0, 2.0, 3.0, "here".into()), ChartMark::at(3.0, 1.0, 3.0, String::new())];
         let axis = |name: &str| Axis::new(name, Scale::log([1.0, 3.0], "m"));
-        let chart = Chart::new([420, 330], axis("sweeps"), axis("error"), vec![Series::line(Style::at(0), marks)]);
+        let chart =
+            Chart::new([420, 330], axis("sweeps"), axis("error"), vec![Series::line(Style::at(0), marks)]);
         let style = FigureStyle::new("85mm", "Times New Roman", 8.0).unwrap();
         let svg = style.svg(&chart, &[("pgs", Style::at(0)), ("shim", Style::at(6))]);
         assert!(svg.starts_with("<svg xmlns") && svg.contains("width=\"85mm\" height=\"63.8mm\""), "{svg}");

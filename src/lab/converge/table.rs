@@ -26,7 +26,9 @@ pub fn text(report: &ConvergeReport) -> String {
     let shown = rows.len().min(MOST_ROWS);
     let more = match rows.len() - shown {
         0 => String::new(),
-        more => format!("{more} more rows in converge.csv and converge.json, which also have other orders.\n"),
+        more => {
+            format!("{more} more rows in converge.csv and converge.json, which also have other orders.\n")
+        }
     };
     format!(
         "{}{}{more}\n{}: {} bodies, {} contact points{joints}; {}.\n\
@@ -95,7 +97,8 @@ fn rows(report: &ConvergeReport) -> Vec<SolverRow<'_>> {
                 continue;
             }
             let starts = [Start::Warm, Start::Cold].map(|start| {
-                let mut same = whole.iter().filter(|c| c.solver == curve.solver && c.arithmetic == curve.arithmetic);
+                let mut same =
+                    whole.iter().filter(|c| c.solver == curve.solver && c.arithmetic == curve.arithmetic);
                 let found = same.find(|c| c.start == start)?;
                 Some((*found, if own { &found.own } else { &found.rigid }))
             });
@@ -178,7 +181,9 @@ fn baseline(report: &ConvergeReport) -> String {
         true => format!(": {:.0} sweeps to 1 %, {:.0} to 0.01 %", sweeps(1e-2), sweeps(1e-4)),
         false => String::new(),
     };
-    format!("Gauss–Seidel in f64, in file order and from zero, ends at a factor of {rate:.4} per sweep{counts}.\n")
+    format!(
+        "Gauss–Seidel in f64, in file order and from zero, ends at a factor of {rate:.4} per sweep{counts}.\n"
+    )
 }
 
 /// Where warm starts come from, and which curves are missing.

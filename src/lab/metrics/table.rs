@@ -46,12 +46,13 @@ pub const METRICS: &[Metric] = &[
     always("flight_depth_max_m", "m", "largest overlap of bodies when their contact was found", |o| {
         o.flight_max
     }),
-    always("held_depth_p99_m", "m", "overlap that the solver left, 99th percentile: beyond the depth at which the contact was found", |o| {
-        o.held.p99()
-    }),
-    always("rest_depth_max_m", "m", "largest overlap of the last second", |o| {
-        o.depths.largest().penetration
-    }),
+    always(
+        "held_depth_p99_m",
+        "m",
+        "overlap that the solver left, 99th percentile: beyond the depth at which the contact was found",
+        |o| o.held.p99(),
+    ),
+    always("rest_depth_max_m", "m", "largest overlap of the last second", |o| o.depths.largest().penetration),
     always("penetration_max_m", "m", "largest overlap after a step, pairs searched again", |o| {
         o.penetration.max()
     }),

@@ -52,6 +52,7 @@ pub fn blocks(records: &[Record], environment: &Environment, steps: Option<u32>)
         DocBlock::Table(cheapest),
         plain(unsolved),
         DocBlock::Table(DocTable { most: MOST_NOTES, ..fail_later(records) }),
+        plain(poked(records)),
         DocBlock::Table(accuracies(&scenes, records)),
         DocBlock::Table(standings(&ranking, scenes.len())),
         DocBlock::Text(Tone::Soft, LEGEND.to_string()),
@@ -94,8 +95,7 @@ fn recommendation(ranking: &Ranking, scenes: usize, steps: Option<u32>) -> Strin
         ),
     };
     if ranking.leader().is_some_and(|leader| leader.solver == first.solver) {
-        text +=
-            " No other is faster with any one scene or class of scenes left out, or with half or twice the tolerances.";
+        text += " No other is faster with any one scene or class of scenes left out, or with half or twice the tolerances.";
     }
     if let Some(own) = ranking.standings.iter().find(|s| s.solver == DEFAULT && s.solver != first.solver) {
         text += &format!(" {DEFAULT}, the default, is on {}.", own.good[0]);
@@ -120,13 +120,17 @@ fn by_kind(records: &[Record]) -> Vec<[String; 2]> {
                 format!("not in this study; `simpulse study --scenes {}` compares solvers.", kind.examples()),
             ]),
             0 => {}
-            _ => points.push([format!("{}, {}", capital(name), number(scenes, "scene")), kind_sentence(&own)]),
+            _ => {
+                points.push([format!("{}, {}", capital(name), number(scenes, "scene")), kind_sentence(&own)])
+            }
         }
     }
     let others: Vec<Record> = records.iter().filter(|r| SceneKind::of(&r.scene).is_none()).cloned().collect();
     let scenes: Vec<&[Record]> = others.chunk_by(|a, b| a.scene == b.scene).collect();
     match scenes.len() {
-        few if few <= MOST_OWN => points.extend(scenes.iter().map(|own| [own[0].scene.clone(), kind_sentence(own)])),
+        few if few <= MOST_OWN => {
+            points.extend(scenes.iter().map(|own| [own[0].scene.clone(), kind_sentence(own)]))
+        }
         many => points.push([format!("Other scenes, {many}"), kind_sentence(&others)]),
     }
     points
@@ -154,7 +158,11 @@ fn kind_sentence(records: &[Record]) -> String {
     let others = || ranking.standings.iter().filter(|s| s.solver != first.solver && s.score > 0.0);
     if let Some(faster) = others().find(|s| s.score > first.score * (1.0 + TIE)) {
         let not_on = short_list(&faster.fails_on, 3);
-        text += &format!("; {} is faster ({}), but not good enough on {not_on}", faster.solver, speed(faster, scenes));
+        text += &format!(
+            "; {} is faster ({}), but not good enough on {not_on}",
+            faster.solver,
+            speed(faster, scenes)
+        );
     } else if let Some(next) = others().find(|s| s.good[0] == first.good[0]) {
         text += &format!("; next is {} at {}", next.solver, speed(next, scenes));
     }
@@ -333,7 +341,8 @@ fn runner_up(answer: &Answer, best: &Record) -> [String; 2] {
 /// stricter levels.
 fn accuracies(scenes: &[Answer], records: &[Record]) -> DocTable {
     let caption = "Its errors in % of the tolerances, and the cheapest settings within stricter ones";
-    let head = ["scene", "overlap", "force error", "reference", "rest", "10 × tighter", "µs", "100 × tighter", "µs"];
+    let head =
+        ["scene", "overlap", "force error", "reference", "rest", "10 × tighter", "µs", "100 × tighter", "µs"];
     let mut rows = DocTable { page_only: true, ..DocTable::new(caption, 1, &head) };
     for scene in records.chunk_by(|a, b| a.scene == b.scene) {
         let best = scenes.iter().find(|a| a.scene == scene[0].scene).and_then(Answer::best);
@@ -405,6 +414,25 @@ fn differing(records: &[Record]) -> String {
     }
 }
 
+/// Which advised settings survive random pushes; empty if none were given.
+fn poked(records: &[Record]) -> String {
+    let pushed: Vec<&Record> = each_setting(records.iter().filter(|r| r.poked.is_some()));
+    let fail = |r: &&Record| {
+        Some(format!("  {} under {}, {}: {}\n", r.scene, r.solver, r.setting_text(), r.fails_poked()?))
+    };
+    let failed: Vec<String> = pushed.iter().filter_map(fail).collect();
+    match pushed.len() {
+        0 => String::new(),
+        all => format!(
+            "Pushed at random for half a minute, {} of {all} survive (the cheapest good setting of each solver on scenes that \
+             must rest){}\n{}",
+            all - failed.len(),
+            if failed.is_empty() { "." } else { ". Not:" },
+            failed.concat()
+        ),
+    }
+}
+
 /// Table of the settings that hold in their run and fail in the extended one.
 pub fn fail_later(records: &[Record]) -> DocTable {
     let head = ["scene", "solver", "setting", "µs/step", "within a minute"];
@@ -456,7 +484,10 @@ mod tests {
     fn a_scene_without_an_answer_says_why() {
         let over = page(&[record(1, 1, 20.0, 14e-3)]);
         let words = over.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(words.contains("stack:2 none nearest is pgs, 1 substeps, 1 lane: 1.40 × tolerance of"), "{over}");
+        assert!(
+            words.contains("stack:2 none nearest is pgs, 1 substeps, 1 lane: 1.40 × tolerance of"),
+            "{over}"
+        );
         let text = page(&[failed(1), fell(8, 1, 1.0, 0.0)]);
         assert!(text.contains("stack:2: no setting holds\n"), "{text}");
         assert!(text.contains("2 settings: 0 hold, 0 are good enough"), "{text}");
@@ -479,8 +510,14 @@ mod tests {
         torn[3] = on("y", "soft_step", 1.0);
         let text = page(&torn);
         let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(words.starts_with("Use soft_step: good enough on all 2 scenes, at 83 % of the speed"), "{text}");
-        assert!(words.contains("shim, the default, is on 2.") && !text.contains("No other is faster"), "{text}");
+        assert!(
+            words.starts_with("Use soft_step: good enough on all 2 scenes, at 83 % of the speed"),
+            "{text}"
+        );
+        assert!(
+            words.contains("shim, the default, is on 2.") && !text.contains("No other is faster"),
+            "{text}"
+        );
         assert!(words.contains("x: shim, the fastest there; next is soft_step at 67 %."), "{text}");
     }
 
@@ -498,6 +535,25 @@ mod tests {
         let line = |part: &str| text.lines().any(|l| l.starts_with("stack:2") && l.contains(part));
         assert!(line("fell at step 800") && line("2 substeps, 8 lanes"), "{text}");
         assert_eq!(fail_later(&records).rows.len(), 1);
+    }
+
+    #[test]
+    fn what_does_not_survive_a_player_is_named() {
+        let poked = |mark: bool| {
+            let broken = mark.then_some(Broken { mark: Mark::Fell, step: 70, body: None });
+            Some(Later { steps: 3600, seconds: 60.0, broken, rest_speed_m_s: None })
+        };
+        let records = [
+            Record { poked: poked(true), ..record(8, 1, 5.0, 1e-3) },
+            Record { poked: poked(false), solver: "shim", ..record(8, 1, 5.0, 1e-3) },
+            record(8, 2, 9.0, 1e-3),
+        ];
+        let text = page(&records);
+        assert!(
+            text.contains("1 of 2 survive") && text.contains("pgs, 1 substeps, 8 lanes: fell at step 70"),
+            "{text}"
+        );
+        assert!(!page(&records[2..]).contains("survive"));
     }
 
     #[test]

@@ -167,15 +167,27 @@ fn lanes(record: &Record) -> String {
 /// The cheapest good setting of every solver on every scene or, if it has none, its nearest one or a failure.
 pub fn every_solver(records: &[Record]) -> DocTable {
     let head = [
-        "kind", "scene", "solver", "setting", "µs/step", "× fastest", "overlap", "force error", "reference", "verdict",
+        "kind",
+        "scene",
+        "solver",
+        "setting",
+        "µs/step",
+        "× fastest",
+        "overlap",
+        "force error",
+        "reference",
+        "verdict",
     ];
     let mut rows = DocTable { class: "filtered", ..DocTable::new("Every solver on every scene", 4, &head) };
     for scene in records.chunk_by(|a, b| a.scene == b.scene) {
-        let least = scene.iter().filter(|r| r.excess() <= 1.0).map(Record::cost_ns).fold(f64::INFINITY, f64::min);
+        let least =
+            scene.iter().filter(|r| r.excess() <= 1.0).map(Record::cost_ns).fold(f64::INFINITY, f64::min);
         for solver in solvers_of(scene) {
             let own: Vec<Record> = scene.iter().filter(|r| r.solver == solver).cloned().collect();
             let Some(answer) = answer::Answer::of(&own) else { continue };
-            let Some(record) = answer.best().or(answer.nearest).or(answer::fails_last(&own)) else { continue };
+            let Some(record) = answer.best().or(answer.nearest).or(answer::fails_last(&own)) else {
+                continue;
+            };
             let good = answer.best().is_some();
             let slower = if good { format!("{}×", digits(record.cost_ns() / least)) } else { String::new() };
             let cells = [
@@ -187,7 +199,10 @@ pub fn every_solver(records: &[Record]) -> DocTable {
                 slower.into(),
                 measured(record, |e| si(e.penetration(record.tolerances.rest.is_some()), "m")).into(),
                 measured(record, |e| percent(e.law_rms_lighter())).into(),
-                record.truth.map_or(String::new(), |t| t.error.map_or("missed".into(), |e| si(e, t.unit))).into(),
+                record
+                    .truth
+                    .map_or(String::new(), |t| t.error.map_or("missed".into(), |e| si(e, t.unit)))
+                    .into(),
                 DocCell::from(verdict(record)).tone(if good { Tone::Good } else { Tone::Bad }),
             ];
             rows.row(cells.map(|cell| match cell.text.as_str() {
@@ -322,7 +337,9 @@ mod tests {
         assert!(text.contains(" fell at step 100") && text.contains(" good enough"), "{text}");
         assert_eq!(text.matches("1.23 mm").count(), 4, "{text}");
         assert_eq!(text.matches(" blew up at step 7").count(), 1, "{text}");
-        assert!(text.contains("failed: pgs, 9 substeps, 1 lane: diverged at step 7: body 2 has no finite speed"));
+        assert!(
+            text.contains("failed: pgs, 9 substeps, 1 lane: diverged at step 7: body 2 has no finite speed")
+        );
         assert!(text.contains("state differs from the error run: pgs, 1 substeps, 8 lanes"));
         // No cell is empty.
         let columns = |line: &str| line.split("  ").filter(|cell| !cell.trim().is_empty()).count();

@@ -84,9 +84,12 @@ const SETTING: &[(Column, StudyCell)] = &[
     cell("class", "", "placed at rest, arrives at rest, or moves", |r, _| r.class.word().into()),
     cell("dt_s", "s", "length of a step", |r, _| r.dt.into()),
     cell("solver", "", "name of the solver", |r, _| r.solver.into()),
-    cell("order", "", "order of constraints: natural (that of the file), reversed, shuffled or colored (parallel)", |r, _| {
-        r.order.name().into()
-    }),
+    cell(
+        "order",
+        "",
+        "order of constraints: natural (that of the file), reversed, shuffled or colored (parallel)",
+        |r, _| r.order.name().into(),
+    ),
     cell("lanes", "", "lanes per instruction", |r, _| r.lanes.into()),
     cell("lanes_emulated", "", "whether the build has no instructions so wide", |r, _| {
         is_emulated(r.lanes).into()
@@ -193,10 +196,15 @@ const VERDICT: &[(Column, StudyCell)] = &[
         "tolerance of the speed at rest; empty where nothing has to rest",
         |r, _| r.tolerances.rest.map(|t| t.value).into(),
     ),
-    cell("plausible", "", "good enough: holds, also for a minute if it has to rest, within every tolerance", |r, _| {
-        r.is_good(Accuracy::Plausible).into()
+    cell(
+        "plausible",
+        "",
+        "good enough: holds, also for a minute if it has to rest, within every tolerance",
+        |r, _| r.is_good(Accuracy::Plausible).into(),
+    ),
+    cell("tight", "", "10 × tighter: the same within 10 % of the tolerances", |r, _| {
+        r.is_good(Accuracy::Tight).into()
     }),
-    cell("tight", "", "10 × tighter: the same within 10 % of the tolerances", |r, _| r.is_good(Accuracy::Tight).into()),
     cell("exact", "", "100 × tighter: the same within 1 %", |r, _| r.is_good(Accuracy::Exact).into()),
     cell("later_seconds", "s", "length of the extended run; empty without one", |r, _| {
         r.later.map(|l| l.seconds).into()
@@ -210,6 +218,12 @@ const VERDICT: &[(Column, StudyCell)] = &[
     cell("later_rest_speed_m_s", "m/s", "speed over the last second of the extended run, rms", |r, _| {
         r.later.and_then(|l| l.rest_speed_m_s).into()
     }),
+    cell(
+        "poked_holds",
+        "",
+        "yes, or what happened in the run of a minute that was pushed at random; empty without one",
+        |r, _| r.poked.map(|l| l.broken.map_or("yes", |b| b.mark.word())).into(),
+    ),
     cell("not_checked", "", "conditions that were not checked, in words", |r, _| {
         r.unchecked.join("; ").into()
     }),
@@ -276,7 +290,11 @@ pub static CONVERGE: Sheet = Sheet {
             ["iterations", "", "iterations of the solver"],
             ["sweeps", "", "sweeps over the constraints"],
             ["time_ns", "ns", "time of these iterations, set-up excluded"],
-            ["rigid_residual", "1", "force error under the rigid contact law, over the problem's unit of impulse"],
+            [
+                "rigid_residual",
+                "1",
+                "force error under the rigid contact law, over the problem's unit of impulse",
+            ],
             ["own_residual", "1", "force error under the solver's own law"],
             [
                 "velocity_error",

@@ -251,7 +251,9 @@ pub fn html(blocks: &[DocBlock]) -> String {
         DocBlock::Text(_, text) if text.trim().is_empty() => String::new(),
         DocBlock::Text(tone, text) => format!("<p class=\"{}\">{}</p>\n", tone.class(), marked(text)),
         DocBlock::Points(points) => {
-            let point = |[about, words]: &[String; 2]| format!("<dt>{}</dt><dd>{}</dd>\n", escaped(about), marked(words));
+            let point = |[about, words]: &[String; 2]| {
+                format!("<dt>{}</dt><dd>{}</dd>\n", escaped(about), marked(words))
+            };
             format!("<dl>\n{}</dl>\n", points.iter().map(point).collect::<String>())
         }
         DocBlock::Table(table) if table.rows.is_empty() => String::new(),

@@ -113,7 +113,8 @@ fn good(members: &[&Record]) -> usize {
 /// ensembles.
 pub fn table(records: &[Record]) -> DocTable {
     let caption = "Means over seeds, ± half of the 95 % confidence interval: each solver's setting that is good enough from most seeds, and of those the fastest";
-    let head = ["scene", "solver", "setting", "good enough", "µs/step", "overlap", "force error", "reference"];
+    let head =
+        ["scene", "solver", "setting", "good enough", "µs/step", "overlap", "force error", "reference"];
     let mut rows = DocTable::new(caption, 3, &head);
     let all: Vec<Vec<&Record>> = ensembles(records).into_iter().filter(|members| members.len() > 1).collect();
     for scene in distinct(all.iter().map(|members| scene_of(members[0]))) {
@@ -146,11 +147,19 @@ const COLUMNS: [[&str; 3]; 15] = [
     ["scene", "", "name with its size, without a seed"],
     ["solver", "", "name of the solver"],
     ["setting", "", "substeps, sweeps, treatments and parameters in words"],
-    ["order", "", "order of constraints: natural (that of the file), reversed, shuffled or colored (parallel)"],
+    [
+        "order",
+        "",
+        "order of constraints: natural (that of the file), reversed, shuffled or colored (parallel)",
+    ],
     ["lanes", "", "lanes per instruction"],
     ["swept", "", "quantity that a sweep varies; empty without --sweep"],
     ["swept_value", "*", "its value"],
-    ["figure", "", "mean_step, median_step, longest_step, overlap, force_error, reference_error, rest_speed, good_enough"],
+    [
+        "figure",
+        "",
+        "mean_step, median_step, longest_step, overlap, force_error, reference_error, rest_speed, good_enough",
+    ],
     ["unit", "", "unit of the next columns"],
     ["seeds", "", "number of values: seeds from which the run did not fail"],
     ["mean", "*", "mean over seeds; the value itself for one seed"],
@@ -167,7 +176,8 @@ pub fn csv(records: &[Record]) -> Result<Vec<u8>, Error> {
     for members in ensembles(records) {
         let first = members[0];
         let kind = SceneKind::of(&first.scene).map_or("", SceneKind::words);
-        let swept = first.swept.map_or([String::new(), String::new()], |s| [s.name.to_string(), s.value.to_string()]);
+        let swept =
+            first.swept.map_or([String::new(), String::new()], |s| [s.name.to_string(), s.value.to_string()]);
         let limit = |figure: &str| match figure {
             "overlap" => Some(first.tolerances.penetration.value),
             "force_error" => Some(first.tolerances.residual.value),
@@ -175,11 +185,14 @@ pub fn csv(records: &[Record]) -> Result<Vec<u8>, Error> {
             "rest_speed" => first.tolerances.rest.map(|t| t.value),
             _ => None,
         };
-        let figures = FIGURES.into_iter().filter_map(|(name, unit, of)| Some((name, unit, interval(&members, of)?)));
-        let share = Interval::of_share(good(&members), members.len()).map(|share| ("good_enough", "1", share));
+        let figures =
+            FIGURES.into_iter().filter_map(|(name, unit, of)| Some((name, unit, interval(&members, of)?)));
+        let share =
+            Interval::of_share(good(&members), members.len()).map(|share| ("good_enough", "1", share));
         for (name, unit, found) in figures.chain(share) {
             let unit = if unit == "*" { first.truth.map_or("", |truth| truth.unit) } else { unit };
-            let [low, high] = found.ends.map_or([String::new(), String::new()], |ends| ends.map(|v| v.to_string()));
+            let [low, high] =
+                found.ends.map_or([String::new(), String::new()], |ends| ends.map(|v| v.to_string()));
             let [swept, value] = swept.clone();
             let line = [
                 kind.to_string(),

@@ -7,8 +7,8 @@ pub mod by_scene;
 pub mod columns;
 #[doc(hidden)]
 pub mod doc;
-pub mod environment;
 pub mod ensemble;
+pub mod environment;
 #[doc(hidden)]
 pub mod html;
 pub mod study_file;
@@ -28,7 +28,8 @@ use std::path::{Path, PathBuf};
 use study_file::StudyFile;
 
 /// Files of a study, besides its recordings.
-const FILES: [&str; 7] = ["tables.txt", "study.csv", ensemble::NAME, study_file::NAME, found::NAME, html::NAME, "figures"];
+const FILES: [&str; 7] =
+    ["tables.txt", "study.csv", ensemble::NAME, study_file::NAME, found::NAME, html::NAME, "figures"];
 
 /// Moves the study that a folder holds to `previous/N` below it, with the first free number N, so that no study
 /// is ever overwritten. Returns the new place; `None` if the folder holds no study.

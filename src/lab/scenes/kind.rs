@@ -55,15 +55,19 @@ impl SceneKind {
     /// The kind of a scene of the catalog, by its name with or without size and seed; `None` for other scenes.
     pub fn of(name: &str) -> Option<Self> {
         Some(match name.split([':', '@']).next().unwrap_or(name) {
-            "disc_column" | "stack" | "vertical_stack" | "circle_stack" | "far_stack" | "overlap_recovery"
-            | "pyramid" | "large_pyramid" | "many_pyramids" | "arch" | "card_house" => SceneKind::Stacks,
+            "disc_column" | "stack" | "vertical_stack" | "circle_stack" | "far_stack"
+            | "overlap_recovery" | "pyramid" | "large_pyramid" | "many_pyramids" | "arch" | "card_house" => {
+                SceneKind::Stacks
+            }
             "washer" | "tumbler" | "junkyard" | "compounds" | "circle_pile" => SceneKind::Piles,
             "mass_ratio" | "high_mass_ratio_1" | "high_mass_ratio_2" => SceneKind::HeavyOnLight,
             "free_fall" | "free_spin" | "bounce" | "bounce_elastic" | "oblique_collision" | "single_box"
             | "double_domino" | "smash" => SceneKind::Fast,
-            "bridge" | "ball_and_chain" | "stretched_chain" | "far_chain" | "cantilever" | "hanging_chain"
-            | "pendulum" | "double_pendulum" | "four_bar" | "cradle" | "vehicle" | "crane" | "joint_grid"
-            | "spinner" | "falling_hinges" | "ragdolls" | "rain" => SceneKind::Joints,
+            "bridge" | "ball_and_chain" | "stretched_chain" | "far_chain" | "cantilever"
+            | "hanging_chain" | "pendulum" | "double_pendulum" | "four_bar" | "cradle" | "vehicle"
+            | "crane" | "joint_grid" | "spinner" | "falling_hinges" | "ragdolls" | "rain" => {
+                SceneKind::Joints
+            }
             "incline_stick" | "incline_slip" | "rolling_incline" | "slipping_disc" | "sliding_stop"
             | "slide_to_roll" | "friction_ramp" => SceneKind::Sliding,
             _ => return None,

@@ -7,8 +7,8 @@ use crate::engine::constraints::Impacts;
 use crate::engine::params::{Budget, Parameters};
 use crate::engine::solvers::{Variant, find};
 use crate::lab::error::Error;
-use crate::lab::study::plan::seed_of;
 use crate::lab::overrides;
+use crate::lab::study::plan::seed_of;
 use serde::{Deserialize, Serialize};
 use std::sync::{Arc, LazyLock};
 

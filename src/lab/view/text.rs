@@ -18,11 +18,7 @@ use serde_json::{Value, json};
 /// Description of a pane for a recording.
 pub(super) fn caption(source: &Source, pane: &Pane) -> Caption {
     let record = pane.record();
-    Caption {
-        scene: source.name.clone(),
-        solver: record.solver.into(),
-        setting: record.setting_text(),
-    }
+    Caption { scene: source.name.clone(), solver: record.solver.into(), setting: record.setting_text() }
 }
 
 impl Session {

@@ -1,15 +1,15 @@
 //! The charts of a study. A setting is drawn at its fastest lane width.
 
+use crate::engine::solvers::find;
 use crate::lab::chart::scale::number;
 use crate::lab::chart::{Axis, Chart, ChartMark, FailStrip, LineStyle, Scale, Series, Style};
-use crate::engine::solvers::find;
 use crate::lab::report::by_scene;
+use crate::lab::study::budget;
 use crate::lab::study::curve::{ERROR_FLOOR, ErrorAxis, distinct, solvers_of};
 use crate::lab::study::profile::Profile;
 use crate::lab::study::search::LEVELS;
 use crate::lab::study::sweep::Swept;
 use crate::lab::study::{Record, answer};
-use crate::lab::study::budget;
 use crate::lab::units::{percent, si};
 
 /// The records of each scene.
@@ -86,7 +86,10 @@ pub fn figures(records: &[Record]) -> Vec<(String, Chart)> {
         all.extend(named("profile", profiles(records)));
     }
     for scene in scenes(records) {
-        all.extend(named(&scene[0].scene, swept.map_or_else(|| precision(scene), |swept| sweep(scene, swept))));
+        all.extend(named(
+            &scene[0].scene,
+            swept.map_or_else(|| precision(scene), |swept| sweep(scene, swept)),
+        ));
     }
     all
 }
@@ -159,9 +162,8 @@ pub fn overview(records: &[Record]) -> Option<Chart> {
         let settings = answer::each_setting(scene);
         let least =
             settings.iter().filter(|r| r.holds()).filter_map(|r| time(r)).fold(f64::INFINITY, f64::min);
-        let small = |r: &Record| {
-            !r.order.is_serial() && (r.impacts, r.frozen) == (scene[0].impacts, scene[0].frozen)
-        };
+        let small =
+            |r: &Record| !r.order.is_serial() && (r.impacts, r.frozen) == (scene[0].impacts, scene[0].frozen);
         let timed = settings.into_iter().filter(|_| least.is_finite());
         dots.extend(timed.filter_map(|r| Some((r, time(r)? / least, small(r)))));
     }
@@ -172,7 +174,8 @@ pub fn overview(records: &[Record]) -> Option<Chart> {
     for solver in solvers_of(records) {
         let own = || dots.iter().filter(|d| d.0.solver == solver);
         let small = own().filter(|d| d.2).map(|(r, slower, _)| {
-            let what = format!("{solver} on {}: {}, {}× the fastest", r.scene, r.setting_text(), number(*slower));
+            let what =
+                format!("{solver} on {}: {}, {}× the fastest", r.scene, r.setting_text(), number(*slower));
             let error = wrong(r).map_or(String::new(), |x| format!("error {} × tolerance", number(x)));
             mark(r, [wrong(r), Some(*slower)], 2.6, what, error)
         });
@@ -329,7 +332,8 @@ fn sweep_chart(scene: &[Record], swept: Swept, error: Option<ErrorAxis>, unit: &
         let mut own: Vec<&&Record> = settings.iter().filter(is_own).collect();
         own.sort_by(|a, b| at(a).total_cmp(&at(b)));
         let mark = |r: &&&Record| {
-            let what = format!("{solver}, {} {} {}, {}", swept.name, number(at(r)), swept.unit, r.setting_text());
+            let what =
+                format!("{solver}, {} {} {}, {}", swept.name, number(at(r)), swept.unit, r.setting_text());
             let y = value(r);
             let text = y.map_or(String::new(), |y| if unit == "s" { si(y, "s") } else { shown(y, unit) });
             let bar = quartiles(r).filter(|_| error.is_none() && !is_dt);

@@ -70,7 +70,8 @@ pub fn write(folder: &Path, study: &StudyFile) -> Result<PathBuf, Error> {
 pub fn write_figures(folder: &Path, records: &[Record], style: &FigureStyle) -> Result<Vec<PathBuf>, Error> {
     let folder = folder.join("figures");
     files::prepare_folder(&folder)?;
-    let names: Vec<(&str, Style)> = solvers_of(records).into_iter().map(|name| (name, Style::of(name))).collect();
+    let names: Vec<(&str, Style)> =
+        solvers_of(records).into_iter().map(|name| (name, Style::of(name))).collect();
     let write = |(name, chart)| {
         let path = folder.join(format!("{name}.svg"));
         files::write(&path, style.svg(&chart, &names).as_bytes()).map(|()| path)
