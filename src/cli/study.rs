@@ -138,6 +138,15 @@ pub struct StudyArgs {
     /// Print JSON instead of text: what study.json holds
     #[arg(help_heading = "Output", long)]
     pub json: bool,
+    /// Push the advised settings of scenes that must rest at random, as a player would: do they survive?
+    #[arg(help_heading = "Measuring", long, value_name = "SEED", conflicts_with = "sweep")]
+    pub poke: Option<u64>,
+    /// Measure errors only, for many machines: --shard then takes every N-th pair of scene and solver
+    #[arg(help_heading = "Parts", long, conflicts_with_all = ["sweep", "features", "resume", "poke", "thorough"])]
+    pub errors: bool,
+    /// Time the settings of a merged study of errors, on one quiet machine; give the other options again
+    #[arg(help_heading = "Parts", long, value_name = "DIR", conflicts_with_all = ["errors", "shard", "resume", "merge", "sweep", "features", "thorough"])]
+    pub times: Option<PathBuf>,
     /// Run part I of N: every N-th scene; --merge joins the parts
     #[arg(help_heading = "Parts", long, value_name = "I/N")]
     pub shard: Option<Shard>,
@@ -225,6 +234,9 @@ impl StudyArgs {
             timing_steps: base.timing_steps,
             repeats: self.repeats.unwrap_or(base.repeats),
             seed: self.seed,
+            poke: self.poke,
+            errors_only: self.errors,
+            share: self.shard.filter(|_| self.errors).map(|shard| [shard.index, shard.count]),
             ..base
         })
     }
@@ -338,10 +350,13 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode, Error> {
         None => String::new(),
     };
     let mut elsewhere = Vec::new();
-    if let Some(shard) = args.shard {
+    if let Some(shard) = args.shard.filter(|_| !args.errors) {
         (plan.scenes, elsewhere) = shard.split(plan.scenes)?;
     }
     plan.check()?;
+    if let Some(folder) = &args.times {
+        return times(args, &plan, folder);
+    }
     let not_held: String = plan.not_held()?.iter().map(|line| format!("skipped: {line}\n")).collect();
     note(&(without + &overrides::partly(&plan.solvers, &plan.overrides) + &not_held));
     // Fail before the long computation, not after it.
@@ -466,12 +481,51 @@ fn resumed(earlier: StudyFile, out: &Path, plan: &StudyPlan) -> Result<StudyFile
     }
 }
 
+/// Times the settings of a study of errors.
+fn times(args: &StudyArgs, plan: &StudyPlan, folder: &Path) -> Result<ExitCode, Error> {
+    let errors = StudyFile::read(folder)?;
+    let refused = |why: String| Error::invalid("--times", format!("{} {why}", folder.display()));
+    if !errors.errors_only() {
+        return Err(refused("is no study with --errors".to_string()));
+    }
+    let differing = differing_settings(&errors.settings, &settings(plan)).into_iter();
+    let own = ["errors_only", "poke", "repeats", "scenes", "budget_search"];
+    let list: Vec<String> = differing
+        .filter(|(name, _)| !own.contains(&&**name))
+        .map(|(name, [there, here])| format!("{name} is {there} there, {here} here"))
+        .collect();
+    if !list.is_empty() {
+        return Err(refused(format!("holds another study: {}", list.join("; "))));
+    }
+    files::prepare_folder(&args.out)?;
+    let _lock = files::Lock::of(&args.out)?;
+    let bar = Bar::new();
+    let records = study::run_times(plan, &errors.records, &|p| bar.show(p.done, p.total, p.what))?;
+    drop(bar);
+    let replays = telling::recordings(plan, &records)?;
+    let study = StudyFile { command: command_line(), ..StudyFile::new(plan, records, errors.missing_scenes) };
+    let _writing = interrupt::writing();
+    let kept = report::keep_previous(&args.out)?;
+    let replays = html::write_recordings(&args.out, &replays)?;
+    let mut paths = report::write_study(&args.out, &study)?;
+    paths.extend(replays);
+    finish(args, &study, &paths, String::new(), &kept)
+}
+
 /// Merges the parts of a study.
 fn merge(args: &StudyArgs) -> Result<ExitCode, Error> {
     let parts = args.merge.iter().map(|path| StudyFile::read(path)).collect::<Result<Vec<_>, _>>()?;
     let names: Vec<String> = args.merge.iter().map(|path| path.display().to_string()).collect();
     let commands: Vec<String> = parts.iter().map(|part| part.command.clone()).collect();
     let whole = StudyFile { command: command_line(), ..StudyFile::merged(parts, &names)? };
+    let lacks = whole.errors_only() && !missing_shards(&commands).is_empty();
+    if lacks && !args.partial {
+        let message = format!(
+            "parts are missing; to make them: {}; --partial merges without them",
+            missing_shards(&commands).join("; ")
+        );
+        return Err(Error::invalid("merge", message));
+    }
     if !whole.missing_scenes.is_empty() && !args.partial {
         let missing = whole.missing_scenes.join(", ");
         let made_by = missing_parts(&commands).join("; ");
@@ -505,6 +559,19 @@ fn replays_of(parts: &[PathBuf], whole: &StudyFile) -> Result<Vec<Vec<u8>>, Erro
 /// Commands that make the parts that are missing, from those of the others: the shards that none of them ran, or else
 /// each of them again with --resume.
 fn missing_parts(commands: &[String]) -> Vec<String> {
+    let shards = missing_shards(commands);
+    if !shards.is_empty() {
+        return shards;
+    }
+    commands
+        .iter()
+        .filter(|command| !command.is_empty())
+        .map(|command| format!("{command} --resume"))
+        .collect()
+}
+
+/// Commands that make the shards that none of these commands made.
+fn missing_shards(commands: &[String]) -> Vec<String> {
     let shard = |command: &String| -> Option<Shard> {
         let mut words = command.split([' ', '=']).skip_while(|word| *word != "--shard");
         words.nth(1)?.parse().ok()
@@ -525,16 +592,9 @@ fn missing_parts(commands: &[String]) -> Vec<String> {
             }
             format!("{} --shard {index}/{} --out part-{index}", text.join(" "), first.count)
         };
-        let list: Vec<String> = missing.map(of).collect();
-        if !list.is_empty() {
-            return list;
-        }
+        return missing.map(of).collect();
     }
-    commands
-        .iter()
-        .filter(|command| !command.is_empty())
-        .map(|command| format!("{command} --resume"))
-        .collect()
+    Vec::new()
 }
 
 /// Drops solvers that do not have the swept quantity, and returns a message about them.
@@ -566,6 +626,18 @@ fn finish(
         return print(&String::from_utf8_lossy(&study.to_json()?));
     }
     let StudyFile { records, environment, .. } = study;
+    if study.errors_only() {
+        let held = records.iter().filter(|r| r.holds()).count();
+        let first = format!(
+            "errors of {} settings, {held} hold; `simpulse study --times DIR` times them\n",
+            records.len()
+        );
+        return print(
+            &(first
+                + &doc::lines(&study.caution())
+                + &format!("wrote study.json in {}\n", args.out.display())),
+        );
+    }
     let mut text = first + &doc::lines(&study.caution());
     text += &match sweep::is_sweep(records) {
         true => sweep::text(records, environment),

@@ -41,7 +41,7 @@ pub fn percent(fraction: f64) -> String {
     let value = 100.0 * fraction;
     match value.abs() {
         0.0 => "0 %".to_string(),
-        size if size < 1e-3 || !size.is_finite() => format!("{value:.0e} %"),
+        size if !(1e-3..1e5).contains(&size) => format!("{value:.0e} %"),
         size => {
             let decimals = (1 - size.log10().floor() as i32).max(0) as usize;
             let text = format!("{value:.decimals$}");

@@ -98,3 +98,43 @@ fn the_page_is_whole_in_a_browser() {
     assert!(found["plots"].as_u64().unwrap() >= 25 && found["titles"].as_u64().unwrap() > 300, "{found}");
     assert!((found["time"].as_f64().unwrap() - 5.0).abs() < 1e-6, "{found}");
 }
+
+#[test]
+fn errors_of_pairs_and_times_make_the_study_and_its_figures() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let options = "study --scenes stack:2,incline_slip --quick --lanes 8 --solvers pgs,shim --repeats 1";
+    succeeds(path, &format!("{options} --out whole"));
+    for part in 1..=3 {
+        succeeds(path, &format!("{options} --errors --shard {part}/3 --out p{part}"));
+    }
+    refused(path, "study --merge p1,p3 --out e", &["--shard 2/3", "--partial"]);
+    succeeds(path, "study --merge p1,p2,p3 --out e");
+    refused(path, &format!("{options} --steps 7 --times e --out t"), &["--times", "steps"]);
+    refused(path, &format!("{options} --times whole --out t"), &["whole", "--errors"]);
+    succeeds(path, &format!("{options} --times e --figure 85mm --poke 1 --out t"));
+    let study = |name: &str| -> serde_json::Value {
+        serde_json::from_slice(&std::fs::read(path.join(name).join("study.json")).unwrap()).unwrap()
+    };
+    let (whole, parts) = (study("whole"), study("t"));
+    let records = |study: &serde_json::Value| -> Vec<String> {
+        let of = |r: &serde_json::Value| {
+            format!(
+                "{} {} {} {} {} {}",
+                r["scene"], r["solver"], r["budget_text"], r["lanes"], r["errors"], r["bits_equal"]
+            )
+        };
+        let mut all: Vec<String> = study["records"].as_array().unwrap().iter().map(of).collect();
+        all.sort();
+        all
+    };
+    assert_eq!(records(&whole), records(&parts));
+    assert!(parts["records"].as_array().unwrap().iter().any(|r| r["poked"]["steps"] == 3600));
+    let figure = std::fs::read_to_string(path.join("t/figures/overview.svg")).unwrap();
+    assert!(figure.contains("width=\"85mm\"") && !figure.contains("var(--"));
+    refused(path, &format!("{options} --figure 85px"), &["'85px'"]);
+    refused(path, &format!("{options} --seeds 5-1"), &["'5-1'"]);
+    let text = succeeds(path, "study --scenes stack:2 --seeds 1-3 --quick --lanes 8 --solvers pgs --out s");
+    assert!(text.contains("Means over seeds") && text.contains("3 of 3"), "{text}");
+    assert!(std::fs::read_to_string(path.join("s/tidy.csv")).unwrap().contains("stacks,stack:2,pgs,"));
+}

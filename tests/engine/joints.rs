@@ -297,7 +297,8 @@ fn joined_bodies_collide_if_they_are_told_to() {
 fn the_angle_of_a_driven_wheel_is_not_wrapped() {
     let (mut world, ground) = empty(find("shim").unwrap());
     let wheel = world.add_body(&BodyDef::dynamic([0.0; 2]).with(ShapeDef::circle(1.0).unwrap())).unwrap();
-    let joint = world.add_joint(&Joint::revolute(ground, wheel).anchor([0.0; 2]).motor(3.0, 1e3).unwrap()).unwrap();
+    let joint =
+        world.add_joint(&Joint::revolute(ground, wheel).anchor([0.0; 2]).motor(3.0, 1e3).unwrap()).unwrap();
     (0..460).for_each(|_| world.step().unwrap());
     let angle = world.joint_state(joint).unwrap().angle;
     assert!((angle - 3.0 * 460.0 / 60.0).abs() < 0.1, "{angle}");

@@ -138,7 +138,8 @@ impl World {
     pub fn joint(&self, handle: JointHandle) -> Result<&Joint, Error> {
         let (index, slots) = (handle.index(), &self.joints);
         let now = slots.generation.get(index).copied();
-        let joint = slots.joints.get(index).and_then(Option::as_ref).filter(|_| now == Some(handle.generation));
+        let joint =
+            slots.joints.get(index).and_then(Option::as_ref).filter(|_| now == Some(handle.generation));
         joint.ok_or_else(|| self.slots.rejects("joint", index, handle.generation, now))
     }
 

@@ -52,6 +52,7 @@ pub fn blocks(records: &[Record], environment: &Environment, steps: Option<u32>)
         DocBlock::Table(cheapest),
         plain(unsolved),
         DocBlock::Table(DocTable { most: MOST_NOTES, ..fail_later(records) }),
+        plain(poked(records)),
         DocBlock::Table(accuracies(&scenes, records)),
         DocBlock::Table(standings(&ranking, scenes.len())),
         DocBlock::Text(Tone::Soft, LEGEND.to_string()),
@@ -413,6 +414,25 @@ fn differing(records: &[Record]) -> String {
     }
 }
 
+/// Which advised settings survive random pushes; empty if none were given.
+fn poked(records: &[Record]) -> String {
+    let pushed: Vec<&Record> = each_setting(records.iter().filter(|r| r.poked.is_some()));
+    let fail = |r: &&Record| {
+        Some(format!("  {} under {}, {}: {}\n", r.scene, r.solver, r.setting_text(), r.fails_poked()?))
+    };
+    let failed: Vec<String> = pushed.iter().filter_map(fail).collect();
+    match pushed.len() {
+        0 => String::new(),
+        all => format!(
+            "Pushed at random for half a minute, {} of {all} survive (the cheapest good setting of each solver on scenes that \
+             must rest){}\n{}",
+            all - failed.len(),
+            if failed.is_empty() { "." } else { ". Not:" },
+            failed.concat()
+        ),
+    }
+}
+
 /// Table of the settings that hold in their run and fail in the extended one.
 pub fn fail_later(records: &[Record]) -> DocTable {
     let head = ["scene", "solver", "setting", "µs/step", "within a minute"];
@@ -515,6 +535,25 @@ mod tests {
         let line = |part: &str| text.lines().any(|l| l.starts_with("stack:2") && l.contains(part));
         assert!(line("fell at step 800") && line("2 substeps, 8 lanes"), "{text}");
         assert_eq!(fail_later(&records).rows.len(), 1);
+    }
+
+    #[test]
+    fn what_does_not_survive_a_player_is_named() {
+        let poked = |mark: bool| {
+            let broken = mark.then_some(Broken { mark: Mark::Fell, step: 70, body: None });
+            Some(Later { steps: 3600, seconds: 60.0, broken, rest_speed_m_s: None })
+        };
+        let records = [
+            Record { poked: poked(true), ..record(8, 1, 5.0, 1e-3) },
+            Record { poked: poked(false), solver: "shim", ..record(8, 1, 5.0, 1e-3) },
+            record(8, 2, 9.0, 1e-3),
+        ];
+        let text = page(&records);
+        assert!(
+            text.contains("1 of 2 survive") && text.contains("pgs, 1 substeps, 8 lanes: fell at step 70"),
+            "{text}"
+        );
+        assert!(!page(&records[2..]).contains("survive"));
     }
 
     #[test]

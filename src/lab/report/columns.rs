@@ -218,6 +218,12 @@ const VERDICT: &[(Column, StudyCell)] = &[
     cell("later_rest_speed_m_s", "m/s", "speed over the last second of the extended run, rms", |r, _| {
         r.later.and_then(|l| l.rest_speed_m_s).into()
     }),
+    cell(
+        "poked_holds",
+        "",
+        "yes, or what happened in the run of a minute that was pushed at random; empty without one",
+        |r, _| r.poked.map(|l| l.broken.map_or("yes", |b| b.mark.word())).into(),
+    ),
     cell("not_checked", "", "conditions that were not checked, in words", |r, _| {
         r.unchecked.join("; ").into()
     }),

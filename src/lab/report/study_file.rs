@@ -69,6 +69,9 @@ pub fn settings(plan: &StudyPlan) -> Value {
         "tolerance": plan.tolerances,
         "found_to_rest": plan.rests,
         "seed": plan.seed,
+        "poke": plan.poke,
+        "errors_only": plan.errors_only,
+        "share": plan.share,
     })
 }
 
@@ -117,7 +120,8 @@ impl StudyFile {
             StudyFile { missing_scenes: Vec::new(), parts: Vec::new(), records: Vec::new(), ..first.clone() };
         let mut found: Vec<(String, &String)> = Vec::new();
         for (part, name) in parts.iter().zip(names) {
-            let differs = |(name, _): &(String, [String; 2])| !["scenes", "budget_search"].contains(&&**name);
+            let differs =
+                |(name, _): &(String, [String; 2])| !["scenes", "budget_search", "share"].contains(&&**name);
             if differing_settings(&part.settings, &first.settings).iter().any(differs) {
                 let message = format!("{name} was run with different settings than {}", names[0]);
                 return Err(Error::invalid("merge", message));
@@ -130,11 +134,12 @@ impl StudyFile {
                 );
                 return Err(Error::invalid("merge", message));
             }
-            for scene in part.scenes() {
-                if let Some((_, other)) = found.iter().find(|(known, _)| *known == scene) {
-                    return Err(Error::invalid("merge", format!("{scene} is in {other} and in {name}")));
+            // Errors of a scene may come from several parts, those of a solver on it from one.
+            for key in part.units() {
+                if let Some((_, other)) = found.iter().find(|(known, _)| *known == key) {
+                    return Err(Error::invalid("merge", format!("{key} is in {other} and in {name}")));
                 }
-                found.push((scene, name));
+                found.push((key, name));
             }
             whole.parts.extend(part.all_parts().into_iter().filter(|part| !part.scenes.is_empty()));
         }
@@ -154,8 +159,29 @@ impl StudyFile {
             let others = lists(|settings| &settings["budget_search"]["not_searched"]);
             whole.settings["budget_search"]["not_searched"] = others;
         }
+        whole.settings["share"] = Value::Null;
         whole.records = parts.into_iter().flat_map(|part| part.records).collect();
+        if whole.errors_only() {
+            // Scene by scene, in the order of the plan of the first part.
+            let place = |record: &Record| {
+                found.iter().position(|(key, _)| key.starts_with(&format!("{} ", record.scene)))
+            };
+            whole.records.sort_by_key(|record| place(record));
+        }
         Ok(whole)
+    }
+
+    /// Whether it has no times.
+    pub fn errors_only(&self) -> bool {
+        self.settings["errors_only"] == true
+    }
+
+    /// What no other part may have: its scenes or, without times, its pairs of scene and solver.
+    fn units(&self) -> Vec<String> {
+        if !self.errors_only() {
+            return self.scenes();
+        }
+        distinct(self.records.iter().map(|r| format!("{} under {}", r.scene, r.solver)))
     }
 
     /// The number of steps to which runs were limited, if they were.
@@ -192,7 +218,7 @@ impl StudyFile {
         if !self.missing_scenes.is_empty() {
             text += &format!("PARTIAL: without {}\n", self.missing_scenes.join(", "));
         }
-        if self.parts.len() > 1 {
+        if self.parts.len() > 1 && !self.errors_only() {
             text += &format!(
                 "Times come from {} runs; each scene was timed in one of them, and times of different scenes \
                  are not comparable.\n",

@@ -16,10 +16,16 @@ use crate::lab::scenes::Scene;
 use crate::lab::scenes::holds::{Broken, Demand, HORIZON, Mark};
 use crate::lab::trial::Trial;
 
-/// Runs a scene that should come to rest for [`HORIZON`], or for its own steps if that is longer, under its demands.
+/// Runs a scene that should come to rest for [`HORIZON`], or for its own steps if that is longer, under its demands;
+/// with a seed, it is pushed at random in the first half, as a player would.
 ///
 /// Errors: a scene that cannot be built.
-pub fn later(scene: &Scene, demands: &[Demand], settings: Settings) -> Result<Later, Error> {
+pub fn later(
+    scene: &Scene,
+    demands: &[Demand],
+    settings: Settings,
+    poked: Option<u64>,
+) -> Result<Later, Error> {
     let steps = ((HORIZON / scene.dt).ceil() as u64).max(u64::from(scene.steps));
     let measured = (REST_WINDOW / scene.dt).round().max(1.0) as u64;
     let settings = Settings { record_impulses: false, timed: false, ..settings };
@@ -28,6 +34,7 @@ pub fn later(scene: &Scene, demands: &[Demand], settings: Settings) -> Result<La
         steps,
         measured,
         until_broken: true,
+        poked,
         ..Trial::new(scene, settings)
     };
     let found = trial.run(&mut |_| Ok(()))?;
@@ -64,11 +71,26 @@ pub fn run_on(
         }
         tell(format!("extending {} to a minute: {} settings", scene.name, untried.len()));
         let untried: Vec<Record> = untried.into_iter().cloned().collect();
-        let found = in_parallel(&untried, processors(), |record| later(scene, demands, record.settings()?))?;
+        let found =
+            in_parallel(&untried, processors(), |record| later(scene, demands, record.settings()?, None))?;
         for (record, later) in untried.iter().zip(found) {
             records.iter_mut().filter(|r| same(r, record)).for_each(|r| r.later = Some(later));
         }
     }
+}
+
+/// Pushes the cheapest good setting of each solver on a scene, from a seed.
+///
+/// Errors: as [`later`].
+pub fn poke(scene: &Scene, demands: &[Demand], records: &mut [Record], seed: u64) -> Result<(), Error> {
+    let Some(answer) = Answer::of(records) else { return Ok(()) };
+    let advised: Vec<Record> = answer.of_each_solver().into_iter().cloned().collect();
+    let found =
+        in_parallel(&advised, processors(), |record| later(scene, demands, record.settings()?, Some(seed)))?;
+    for (record, poked) in advised.iter().zip(found) {
+        records.iter_mut().filter(|r| same(r, record)).for_each(|r| r.poked = Some(poked));
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -76,6 +98,7 @@ mod tests {
     use super::*;
     use crate::engine::solvers::find;
     use crate::lab::scenes;
+    use crate::lab::study::record::tests::{failed, record};
 
     #[test]
     fn what_falls_in_a_minute_is_found_with_its_step() {
@@ -84,12 +107,17 @@ mod tests {
             let mut settings = Settings::new(solver);
             settings.budget.velocity_iterations = velocity_iterations;
             let loaded = scenes::load("stack:20").unwrap();
-            later(&loaded.scene, &loaded.demands, settings).unwrap()
+            later(&loaded.scene, &loaded.demands, settings, None).unwrap()
         };
         // Eight sweeps do not support twenty boxes.
         let fallen = run("pgs", 8);
         assert_eq!(fallen.broken.map(|b| b.mark), Some(Mark::Fell), "{fallen:?}");
         assert!(fallen.broken.is_some_and(|b| b.step > 0 && b.step < fallen.steps));
+        // Only settings that would be advised are pushed.
+        let mut records = [Record { solver: "pgs", ..record(8, 1, 1.0, 0.0) }, failed(8)];
+        let loaded = scenes::load("stack:2").unwrap();
+        poke(&loaded.scene, &loaded.demands, &mut records, 1).unwrap();
+        assert!(records[0].poked.is_some_and(|poked| poked.steps == 3600) && records[1].poked.is_none());
         let stands = run("shim", 1);
         assert_eq!((stands.broken, stands.steps), (None, 3600));
         assert!(stands.rest_speed_m_s.is_some_and(|speed| speed < 5e-3), "{stands:?}");

@@ -141,11 +141,11 @@ struct JudgedRun {
 }
 
 /// A record that waits for its times.
-struct TimedRun<'a> {
-    cell: &'a ErrorCell,
-    width: LaneWidth,
+struct TimedRun {
     record: Record,
-    hash: u64,
+    /// Index of the value of the sweep, and the settings.
+    point: usize,
+    settings: Settings,
 }
 
 /// Receives the records of a scene, and the settings that a search found for it.
@@ -192,7 +192,7 @@ fn scene_records(
     for (point, &swept) in plan.points().iter().enumerate() {
         let loaded = plan.open_at(name, swept)?;
         let scene = &loaded.scene;
-        for &solver in plan.solvers.iter().filter(|solver| scene.runs_on(solver).is_ok()) {
+        for solver in plan.solvers_on(name, scene) {
             for &impacts in plan.impacts_on(scene) {
                 for tuned in plan.candidates(&scene.name, solver, impacts, swept)? {
                     let widest_alone = plan.widest_alone(scene, &tuned.budget, solver);
@@ -226,39 +226,82 @@ fn scene_records(
             _ => &[LaneWidth::W1],
         };
         let own = |&width: &LaneWidth| TimedRun {
-            cell,
-            width,
-            record: Record { lanes: width.lanes(), ..record.clone() },
-            hash,
+            record: Record { lanes: width.lanes(), hash: Some(format!("{hash:016x}")), ..record.clone() },
+            point: cell.point,
+            settings: settings(plan, cell, order, width),
         };
         runs.extend(widths.iter().map(own));
     }
-    time(plan, &variants, steps, &mut runs, &|share, what| tell(0.5 + 0.4 * share, what))?;
-    let mut records: Vec<Record> = runs.into_iter().map(|run| run.record).collect();
     // What was asked for is judged in any case.
     if plan.steps.is_some() && !plan.only_given {
-        leave_out_unseen(&mut records, variants[0].scene.steps);
+        leave_out_unseen(
+            &mut runs.iter_mut().map(|run| &mut run.record).collect::<Vec<_>>(),
+            variants[0].scene.steps,
+        );
     }
     let class = SceneClass::of(&variants[0])?;
-    records.iter_mut().for_each(|r| r.class = class);
+    runs.iter_mut().for_each(|run| run.record.class = class);
+    if plan.errors_only {
+        return Ok(runs.into_iter().map(|run| run.record).collect());
+    }
+    timed(plan, &variants, runs, &|share, what| tell(0.5 + 0.5 * share, what))
+}
+
+/// Times the settings of a scene, extends those that would be advised to a minute, and pushes them if that is wanted.
+fn timed(
+    plan: &StudyPlan,
+    variants: &[Loaded],
+    mut runs: Vec<TimedRun>,
+    tell: &(dyn Fn(f64, String) + Sync),
+) -> Result<Vec<Record>, Error> {
+    let steps = timing_steps(plan, variants.iter().map(|v| &v.scene));
+    time(plan, variants, steps, &mut runs, &|share, what| tell(0.8 * share, what))?;
+    let mut records: Vec<Record> = runs.into_iter().map(|run| run.record).collect();
     if plan.sweep.is_none() && variants[0].rests() {
         let Loaded { scene, demands, .. } = &variants[0];
-        horizon::run_on(scene, demands, &mut records, &|what| tell(0.95, what))?;
+        horizon::run_on(scene, demands, &mut records, &|what| tell(0.9, what))?;
+        if let Some(seed) = plan.poke {
+            horizon::poke(scene, demands, &mut records, seed)?;
+        }
     }
     Ok(records)
 }
 
-/// Removes tolerances for errors that a run shortened to `steps` could not observe.
-fn leave_out_unseen(records: &mut [Record], steps: u32) {
-    if records.first().is_some_and(|r| f64::from(steps) * r.dt < 2.0 * crate::lab::metrics::rest::REST_WINDOW)
-    {
+/// Times the settings of a study of errors, scene by scene, as [`run`] does.
+///
+/// Errors: as [`run`]; a record of another version, or of a scene that is not in the plan.
+pub fn run_times(
+    plan: &StudyPlan,
+    records: &[Record],
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Vec<Record>, Error> {
+    let scenes: Vec<&[Record]> = records.chunk_by(|a, b| a.scene == b.scene).collect();
+    let (mut all, total) = (Vec::new(), PARTS * scenes.len());
+    for (i, scene) in scenes.into_iter().enumerate() {
+        let mut opened = plan.scenes.iter().filter_map(|name| plan.open(name).ok());
+        let Some(loaded) = opened.find(|loaded| loaded.scene.name == scene[0].scene) else {
+            return Err(Error::invalid("times", format!("the plan has no scene '{}'", scene[0].scene)));
+        };
+        let run =
+            |record: &Record| Ok(TimedRun { record: record.clone(), point: 0, settings: record.settings()? });
+        let runs = scene.iter().map(run).collect::<Result<Vec<_>, Error>>()?;
+        let tell = |share: f64, what: String| {
+            progress(Progress { done: PARTS * i + (PARTS as f64 * share.min(1.0)) as usize, total, what });
+        };
+        all.extend(timed(plan, &[loaded], runs, &tell)?);
+    }
+    Ok(all)
+}
+
+/// Removes tolerances for errors that runs of a scene that were shortened to `steps` could not observe.
+fn leave_out_unseen(records: &mut [&mut Record], steps: u32) {
+    let window = 2.0 * crate::lab::metrics::rest::REST_WINDOW;
+    if records.first().is_some_and(|r| f64::from(steps) * r.dt < window) {
         // Rest is measured over the last second, which must be preceded by at least as long a run.
         records.iter_mut().for_each(|r| r.tolerances.rest = None);
     }
-    for scene in records.chunk_by_mut(|a, b| a.scene == b.scene) {
-        if scene.iter().all(|r| r.truth.is_none_or(|t| t.error.is_none())) {
-            scene.iter_mut().for_each(|r| r.tolerances.truth = None);
-        }
+    if records.iter().all(|r| r.truth.is_none_or(|t| t.error.is_none())) {
+        records.iter_mut().for_each(|r| r.tolerances.truth = None);
     }
 }
 
@@ -334,10 +377,7 @@ fn time(
     tell: &dyn Fn(f64, String),
 ) -> Result<(), Error> {
     let running = runs.iter().filter(|run| run.record.failure.is_none());
-    let chosen = running.map(|run| {
-        let scene = &variants[run.cell.point].scene;
-        (scene, settings(plan, run.cell, run.record.order, run.width))
-    });
+    let chosen = running.map(|run| (&variants[run.point].scene, run.settings.clone()));
     let mut interleaved = Interleaved::new(chosen.collect(), steps, plan.seed);
     let name = &variants[0].scene.name;
     for pass in 1..=plan.repeats {
@@ -347,7 +387,8 @@ fn time(
     for (i, run) in runs.iter_mut().filter(|run| run.record.failure.is_none()).enumerate() {
         match interleaved.sample(i) {
             Ok(sample) => {
-                run.record.bits_equal = Some(sample.hash == run.hash);
+                let hash = run.record.hash.take();
+                run.record.bits_equal = hash.map(|hash| hash == format!("{:016x}", sample.hash));
                 run.record.sample = Some(sample);
             }
             Err(divergence) => {

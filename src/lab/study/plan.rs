@@ -63,6 +63,12 @@ pub struct StudyPlan {
     pub repeats: u32,
     /// Random seed for the order of timing runs, and for scenes with random elements.
     pub seed: u64,
+    /// Seed of random pushes on the advised settings of scenes that must rest; `None` for none.
+    pub poke: Option<u64>,
+    /// Whether only errors are measured: no times, no extended runs.
+    pub errors_only: bool,
+    /// Of the pairs of scene and solver, every `share[1]`-th from `share[0]` (counted from 1) on; `None` for all.
+    pub share: Option<[usize; 2]>,
 }
 
 /// Sweeps × bodies of timing a setting in one lane, about a second, above which that run is left out.
@@ -92,6 +98,9 @@ impl Default for StudyPlan {
             timing_steps: 300,
             repeats: 3,
             seed: 1,
+            poke: None,
+            errors_only: false,
+            share: None,
         }
     }
 }
@@ -174,6 +183,18 @@ impl StudyPlan {
         Ok(lines)
     }
 
+    /// The solvers of this part that run on a scene; `name` is one of [`Self::scenes`].
+    pub(super) fn solvers_on<'a>(
+        &'a self,
+        name: &str,
+        scene: &'a Scene,
+    ) -> impl Iterator<Item = &'static Variant> + 'a {
+        let place = self.scenes.iter().position(|own| own == name).unwrap_or(0) * self.solvers.len();
+        let is_own = move |i: usize| self.share.is_none_or(|[index, count]| (place + i) % count == index - 1);
+        let own = self.solvers.iter().enumerate().filter(move |(i, _)| is_own(*i)).map(|(_, solver)| *solver);
+        own.filter(|solver| scene.runs_on(solver).is_ok())
+    }
+
     /// The treatments of impacts to run on a scene. Without restitution they are all the same, so only the
     /// first runs.
     pub(super) fn impacts_on(&self, scene: &Scene) -> &[Impacts] {
@@ -235,7 +256,7 @@ impl StudyPlan {
             if loaded.scene.expect.is_some() {
                 continue;
             }
-            let later = horizon::later(&loaded.scene, &loaded.demands, Settings::new(find(DEFAULT)?))?;
+            let later = horizon::later(&loaded.scene, &loaded.demands, Settings::new(find(DEFAULT)?), None)?;
             let limit = self.tolerances.rest.unwrap_or(Tolerances::resting(&loaded.scene).value);
             let found = match (later.broken, later.rest_speed_m_s) {
                 (None, Some(speed)) if speed <= limit => {

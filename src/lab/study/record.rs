@@ -77,6 +77,12 @@ pub struct Record {
     /// Result of the extended run; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub later: Option<Later>,
+    /// Result of the run of a minute that was pushed at random; `None` without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub poked: Option<Later>,
+    /// Hash of the state after a timing run, as hexadecimal digits, until the setting is timed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hash: Option<String>,
     /// Whether this width ended with the same bits as the error run.
     pub bits_equal: Option<bool>,
     /// Divergence that ended the run.
@@ -152,6 +158,8 @@ impl Record {
             broken: None,
             unchecked: Vec::new(),
             later: None,
+            poked: None,
+            hash: None,
             bits_equal: None,
             failure: None,
         }
@@ -191,7 +199,15 @@ impl Record {
 
     /// Failure in the extended run, in words; `None` if it holds or there was no extended run.
     pub fn fails_later(&self) -> Option<String> {
-        let later = self.later?;
+        self.failure_of(self.later?)
+    }
+
+    /// Failure in the run that was pushed, in words; `None` if it survives or there was none.
+    pub fn fails_poked(&self) -> Option<String> {
+        self.failure_of(self.poked?)
+    }
+
+    fn failure_of(&self, later: Later) -> Option<String> {
         if let Some(broken) = later.broken {
             return Some(broken.to_string());
         }
@@ -388,6 +404,8 @@ pub(crate) mod tests {
             broken: None,
             unchecked: Vec::new(),
             later: None,
+            poked: None,
+            hash: None,
             bits_equal: Some(true),
             failure: None,
         }

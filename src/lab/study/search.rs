@@ -237,7 +237,7 @@ impl SearchJob<'_> {
             if let Some(i) = unknown {
                 let (order, width) = self.order();
                 let own = settings(self.plan, &self.cell(&trials[i].candidate), order, width);
-                trials[i].record.later = Some(later(self.scene, self.demands, own)?);
+                trials[i].record.later = Some(later(self.scene, self.demands, own, None)?);
             } else if let Some(next) = dropped.next().filter(|_| none) {
                 trials.extend(self.judged(&[next], self.plan.steps)?);
             } else if chosen.is_empty() {
@@ -275,7 +275,7 @@ impl SearchJob<'_> {
             runs.into_iter().map(|run| (run.record, run.work)).unzip();
         let is_last = plan.only_given && steps == self.plan.steps;
         if let Some(steps) = steps.filter(|_| !is_last) {
-            leave_out_unseen(&mut records, steps);
+            leave_out_unseen(&mut records.iter_mut().collect::<Vec<_>>(), steps);
         }
         let trials = list.iter().zip(records).zip(works);
         Ok(trials.map(|((&candidate, record), work)| SearchTrial { candidate, record, work }).collect())
