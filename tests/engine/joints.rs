@@ -609,7 +609,7 @@ fn a_welded_plank_stays_where_it_is_hit() {
     world.settings.budget.substeps = 2;
     beam(&mut world, ground, 1, [1.0, 0.2]);
     for (i, radius) in [0.3, 0.5].into_iter().enumerate() {
-        let ball = ShapeDef::circle(radius.into()).unwrap().with_density(20.0);
+        let ball = ShapeDef::circle(radius).unwrap().with_density(20.0);
         let at = [0.9, 1.5 + 2.0 * i as f64];
         world.add_body(&BodyDef { velocity: [0.0, -8.0], ..BodyDef::dynamic(at).with(ball) }).unwrap();
     }

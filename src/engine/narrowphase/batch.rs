@@ -275,8 +275,7 @@ pub fn update(
     } else {
         // SAFETY: every pair has a contact of its own, and every part its own spare contacts.
         let (of_contacts, of_found) = unsafe { (shared.0.sent(), shared.1.sent()) };
-        let mut results: Vec<(usize, Vec<(u32, Contact, Option<Found>)>)> =
-            (0..parts).map(|_| Default::default()).collect();
+        let mut results: Vec<(usize, Vec<Changed>)> = (0..parts).map(|_| Default::default()).collect();
         workers.each(results.iter_mut().enumerate(), |(part, (points, changes))| {
             let jobs = part * size..((part + 1) * size).min(count);
             let lists = JobLists(lists.map(|list| list.part(jobs.clone())));
@@ -315,6 +314,9 @@ struct Room<'a> {
 /// Receives the name of a pair that began or ended to touch, its contact, and the poses at which it was found if contacts
 /// are frozen.
 pub type Change<'a> = dyn FnMut(u32, &Contact, Option<Found>) + 'a;
+
+/// The arguments of [`Change`].
+type Changed = (u32, Contact, Option<Found>);
 
 /// Collides the pairs of one kind, as [`update`].
 type CollideFn = fn(JobLists, Input, Room, &mut Change) -> usize;
