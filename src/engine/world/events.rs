@@ -153,12 +153,10 @@ impl World {
         std::mem::swap(&mut events.touching, &mut events.last_touching);
         events.list.clear();
         events.touching.clear();
-        events.touching.extend(self.contacts.iter().map(|contact| {
-            TouchingPair {
-                key: contact.key(),
-                bodies: self.bodies_of(contact),
-                shapes: [contact.shape_a, contact.shape_b],
-            }
+        events.touching.extend(self.contacts.iter().map(|contact| TouchingPair {
+            key: contact.key(),
+            bodies: self.bodies_of(contact),
+            shapes: [contact.shape_a, contact.shape_b],
         }));
         let Events { list, touching, last_touching, approach } = &mut events;
         let end = |&TouchingPair { bodies, shapes, .. }: &TouchingPair| ContactEvent::End { bodies, shapes };

@@ -1,6 +1,7 @@
 //! Adding, changing, removing and reading joints.
 
 use super::World;
+use super::candidates::ignores;
 use crate::bodies::{Bodies, BodyHandle};
 use crate::constraints::joints::Joints;
 use crate::constraints::kernels::types::{BodyStates, ConstraintSet, ConstraintType, RecordedImpulses};
@@ -138,7 +139,8 @@ impl World {
     pub fn joint(&self, handle: JointHandle) -> Result<&Joint, Error> {
         let (index, slots) = (handle.index(), &self.joints);
         let now = slots.generation.get(index).copied();
-        let joint = slots.joints.get(index).and_then(Option::as_ref).filter(|_| now == Some(handle.generation));
+        let joint =
+            slots.joints.get(index).and_then(Option::as_ref).filter(|_| now == Some(handle.generation));
         joint.ok_or_else(|| self.slots.rejects("joint", index, handle.generation, now))
     }
 
@@ -258,10 +260,11 @@ impl World {
         solved
     }
 
-    /// Whether a joint keeps two bodies from colliding. A removed or changed joint still does until the next
-    /// step.
-    pub fn keeps_apart(&self, a: usize, b: usize) -> bool {
-        self.joints.keeps_apart([a as u32, b as u32])
+    /// Whether a joint or filters keep two shapes from colliding. A removed or changed joint still does until the
+    /// next step.
+    pub fn keeps_apart(&self, shapes: [u32; 2]) -> bool {
+        let bodies = shapes.map(|shape| self.shape_body[shape as usize]);
+        ignores(&self.joints, &self.filters, shapes, bodies)
     }
 
     fn check_joint(&self, joint: &Joint) -> Result<(), Error> {

@@ -265,7 +265,9 @@ mod tests {
     fn a_motor_works_at_its_cap_and_then_holds_its_speed() {
         for (solver, substeps) in [("pgs", 1), ("soft_step", 4)] {
             let (mut world, ground, disc) = disc(solver, substeps);
-            world.add_joint(&Joint::revolute(ground, disc).anchor([0.0, 0.0]).motor(0.1, 0.5).unwrap()).unwrap();
+            world
+                .add_joint(&Joint::revolute(ground, disc).anchor([0.0, 0.0]).motor(0.1, 0.5).unwrap())
+                .unwrap();
             let errors = observed(&mut world, 3);
             close(errors.get("joint_motor_load_max"), 1.0);
             close(errors.get("joint_motor_miss_max"), 0.0);
@@ -309,7 +311,9 @@ mod tests {
     fn a_limit_takes_the_energy_of_what_hits_it() {
         let (mut world, ground, disc) = disc("pgs", 1);
         world.bodies.angular_velocity[disc.index()] = 3.0;
-        world.add_joint(&Joint::revolute(ground, disc).anchor([0.0, 0.0]).limits(-1.0, 0.12).unwrap()).unwrap();
+        world
+            .add_joint(&Joint::revolute(ground, disc).anchor([0.0, 0.0]).limits(-1.0, 0.12).unwrap())
+            .unwrap();
         let errors = observed(&mut world, 12);
         assert!(world.bodies.angular_velocity[disc.index()].abs() < 1e-4);
         close(errors.get("joint_excess_max"), 0.0);
@@ -325,7 +329,9 @@ mod tests {
         for (solver, substeps) in [("pgs", 1), ("soft_step", 4), ("shim", 14)] {
             let (mut world, ground, disc) = disc(solver, substeps);
             world.bodies.angular_velocity[disc.index()] = 1.0;
-            world.add_joint(&Joint::revolute(ground, disc).anchor([0.0, 0.0]).spring(1.0, 0.0).unwrap()).unwrap();
+            world
+                .add_joint(&Joint::revolute(ground, disc).anchor([0.0, 0.0]).spring(1.0, 0.0).unwrap())
+                .unwrap();
             // A quarter of a period: from all of the energy to none.
             let quarter = observed(&mut world, 15);
             assert!((quarter.get("joint_spring_work").unwrap() + 1.0).abs() < 0.1, "{solver}: {quarter:?}");

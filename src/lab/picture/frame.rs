@@ -32,7 +32,13 @@ impl Stage {
         let origin = if bodies.is_empty() { [0.0; 2] } else { bodies.center(0) };
         let shapes = world.shape_body().iter().copied().zip(world.shapes().iter().copied()).collect();
         let joints = super::joints::records(world);
-        Stage { origin, kinds: (0..bodies.len()).map(|i| bodies.kind(i)).collect(), shapes, joints, dt: f64::from(world.settings.dt) }
+        Stage {
+            origin,
+            kinds: (0..bodies.len()).map(|i| bodies.kind(i)).collect(),
+            shapes,
+            joints,
+            dt: f64::from(world.settings.dt),
+        }
     }
 }
 
