@@ -477,10 +477,12 @@ fn geometry() -> impl Strategy<Value = Geometry> {
 }
 
 fn shape() -> impl Strategy<Value = SceneShape> {
-    (geometry(), 1e-3..1e3_f64, 0.0..3.0_f64, 0.0..=1.0).prop_map(|(geometry, density, friction, restitution)| {
-        let filter = Filter { category: density.to_bits(), mask: friction.to_bits() };
-        SceneShape { geometry, density, friction, restitution, filter }
-    })
+    (geometry(), 1e-3..1e3_f64, 0.0..3.0_f64, 0.0..=1.0).prop_map(
+        |(geometry, density, friction, restitution)| {
+            let filter = Filter { category: density.to_bits(), mask: friction.to_bits() };
+            SceneShape { geometry, density, friction, restitution, filter }
+        },
+    )
 }
 
 fn body() -> impl Strategy<Value = SceneBody> {

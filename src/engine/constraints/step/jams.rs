@@ -78,8 +78,8 @@ pub(crate) struct Jams {
     /// Bodies in a jam of a squeeze, by number, and the bound of their speed (m/s); those of the last step until
     /// this step's are known.
     jammed: Vec<(u32, f32)>,
-    /// Bodies that welds hold together.
-    welded: DisjointSets,
+    /// Bodies that welds hold together; then those that deep contacts connect.
+    together: DisjointSets,
     /// Non-dynamic body of each welded set, if any, at the lowest index of the set. `[bodies]`
     holders: Vec<u32>,
 }
@@ -162,7 +162,7 @@ impl Jams {
         if welds().next().is_none() {
             return;
         }
-        let Jams { deep, welded, holders, .. } = self;
+        let Jams { deep, together: welded, holders, .. } = self;
         welded.begin(bodies.len());
         welds().for_each(|&[a, b]| welded.join(a, b));
         holders.clear();
@@ -212,21 +212,16 @@ impl Jams {
         let is_dynamic = |body: u32| bodies.is_dynamic(body as usize);
         self.squeezed.clear();
         self.squeezed.resize(bodies.len(), -1.0);
+        self.together.begin(bodies.len());
+        for &([a, b], ..) in self.deep.iter().filter(|(pair, ..)| pair.iter().all(|&body| is_dynamic(body))) {
+            self.together.join(a, b);
+        }
         for &(body, speed) in self.pressed.iter().filter(|p| is_dynamic(p.0)) {
-            let most = &mut self.squeezed[body as usize];
+            let most = &mut self.squeezed[self.together.least(body) as usize];
             *most = most.max(speed);
         }
-        let mut grows = true;
-        while grows {
-            grows = false;
-            for ([a, b], ..) in &self.deep {
-                for (from, to) in [(*a, *b), (*b, *a)] {
-                    let speed = self.squeezed[from as usize];
-                    if speed > self.squeezed[to as usize] && is_dynamic(to) {
-                        (self.squeezed[to as usize], grows) = (speed, true);
-                    }
-                }
-            }
+        for body in 0..bodies.len() {
+            self.squeezed[body] = self.squeezed[self.together.least(body as u32) as usize];
         }
         for (i, contact) in contacts.iter().enumerate() {
             for (own, is_own) in [(contact.body_a, false), (contact.body_b, true)] {
