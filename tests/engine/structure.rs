@@ -42,6 +42,7 @@ const ENGINE: &[&[&str]] = &[
     &["joints"],
     &["solvers"],
     &["world"],
+    &["prelude"],
 ];
 const CONSTRAINTS: &[&[&str]] =
     &[&["numerics"], &["records"], &["kernels"], &["joints", "vectors"], &["impacts"], &["step"]];

@@ -11,6 +11,7 @@ mod elastic;
 mod features;
 mod flush_to_zero;
 mod golden;
+mod import;
 mod impulses;
 mod invariance;
 mod joint_files;

@@ -1,8 +1,9 @@
 //! Scenes: the file format, the catalog, and properties of every scene.
 
 use proptest::prelude::*;
-use simpulse::engine::bodies::BodyKind;
+use simpulse::engine::bodies::{BodyKind, Filter};
 use simpulse::engine::params::LINEAR_SLOP;
+use simpulse::engine::shapes::MassProperties;
 use simpulse::engine::solvers;
 use simpulse::engine::world::Settings;
 use simpulse::lab::error::Error;
@@ -476,9 +477,12 @@ fn geometry() -> impl Strategy<Value = Geometry> {
 }
 
 fn shape() -> impl Strategy<Value = SceneShape> {
-    (geometry(), 1e-3..1e3, 0.0..3.0, 0.0..=1.0).prop_map(|(geometry, density, friction, restitution)| {
-        SceneShape { geometry, density, friction, restitution }
-    })
+    (geometry(), 1e-3..1e3_f64, 0.0..3.0_f64, 0.0..=1.0).prop_map(
+        |(geometry, density, friction, restitution)| {
+            let filter = Filter { category: density.to_bits(), mask: friction.to_bits() };
+            SceneShape { geometry, density, friction, restitution, filter }
+        },
+    )
 }
 
 fn body() -> impl Strategy<Value = SceneBody> {
@@ -497,6 +501,13 @@ fn body() -> impl Strategy<Value = SceneBody> {
                 angular_damping: damping[1],
                 group,
                 bullet: group % 2 == 0,
+                fixed_rotation: group % 3 == 0,
+                belt: kind == BodyKind::Kinematic && group % 5 == 0,
+                mass: (group % 7 == 0).then_some(MassProperties {
+                    mass: 2.0,
+                    center: velocity,
+                    inertia: 3.0,
+                }),
                 shapes,
             }
         },
@@ -513,7 +524,7 @@ proptest! {
         steps in 1..=simpulse::lab::scenes::MAX_STEPS,
         bodies in prop::collection::vec(body(), 1..8),
     ) {
-        let scene = Scene { name, gravity, dt, steps, length_unit: 1.0, expect: None, bodies, joints: vec![] };
+        let scene = Scene { name, gravity, dt, steps, length_unit: 1.0, expect: None, bodies, joints: vec![], left_out: vec![] };
         let text = scene.to_json();
         let back = read(&text).map_err(|e| TestCaseError::fail(e.to_string()))?;
         prop_assert_eq!(format!("{:?}", back), format!("{:?}", scene));

@@ -9,6 +9,32 @@ use glam::{DVec2, Vec2};
 /// Maximum friction coefficient (1), so that the product of two is finite in `f32`.
 pub const MAX_FRICTION: f64 = 1e9;
 
+/// What a shape collides with: two shapes do if the mask of each has a bit of the other's category.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Filter {
+    /// Bits of the categories that the shape belongs to.
+    pub category: u64,
+    /// Bits of the categories that it collides with.
+    pub mask: u64,
+}
+
+/// Category 1, colliding with all.
+impl Default for Filter {
+    fn default() -> Self {
+        Filter { category: 1, mask: u64::MAX }
+    }
+}
+
+impl Filter {
+    /// Whether two shapes with these filters collide.
+    pub fn meets(&self, other: &Filter) -> bool {
+        self.category & other.mask != 0 && other.category & self.mask != 0
+    }
+}
+
 /// A shape and its surface properties.
 ///
 /// ```
@@ -31,6 +57,8 @@ pub struct ShapeDef {
     pub friction: f64,
     /// Restitution, in [0, 1]; two surfaces mix as max(ea, eb).
     pub restitution: f64,
+    /// What it collides with.
+    pub filter: Filter,
 }
 
 /// Definition of a body: its shapes and initial state.
@@ -66,6 +94,14 @@ pub struct BodyDef {
     pub group: i32,
     /// Whether dynamic bodies also stop it in continuous collision, see [`crate::continuous`].
     pub bullet: bool,
+    /// Whether it keeps its angle.
+    pub fixed_rotation: bool,
+    /// Whether its velocity is that of its surface only, as of a conveyor belt, while it stays where it is. For
+    /// kinematic bodies. The surface moves as a rigid body would: faces along the velocity carry what lies on
+    /// them, others push.
+    pub belt: bool,
+    /// Mass, center (m, in the body's frame) and inertia about it, in place of those of the shapes.
+    pub given_mass: Option<MassProperties>,
     /// Shapes, rigidly connected.
     pub shapes: Vec<ShapeDef>,
 }
@@ -73,7 +109,13 @@ pub struct BodyDef {
 impl ShapeDef {
     /// A shape with default density and friction, without restitution.
     pub fn new(shape: Shape) -> Self {
-        ShapeDef { shape, density: DEFAULT_DENSITY, friction: DEFAULT_FRICTION, restitution: 0.0 }
+        ShapeDef {
+            shape,
+            density: DEFAULT_DENSITY,
+            friction: DEFAULT_FRICTION,
+            restitution: 0.0,
+            filter: Filter::default(),
+        }
     }
 
     /// A rectangle centered at the origin of the body. Half extents in m; errors: as [`Shape::rectangle`].
@@ -122,6 +164,11 @@ impl ShapeDef {
         ShapeDef { restitution, ..self }
     }
 
+    /// Sets what the shape collides with, in bits of categories.
+    pub fn with_filter(self, category: u64, mask: u64) -> Self {
+        ShapeDef { filter: Filter { category, mask }, ..self }
+    }
+
     /// Checks the values. Errors: a density ≤ 0, a negative friction or one above [`MAX_FRICTION`], a
     /// restitution outside [0, 1], and values that are not finite in `f32`.
     pub fn check(&self) -> Result<(), Error> {
@@ -158,6 +205,9 @@ impl BodyDef {
             angular_damping: 0.0,
             group: 0,
             bullet: false,
+            fixed_rotation: false,
+            belt: false,
+            given_mass: None,
             shapes,
         }
     }
@@ -212,16 +262,24 @@ impl BodyDef {
         BodyDef { angular_velocity, ..self }
     }
 
-    /// Mass (kg), center (m, in the body's frame) and inertia (kg·m²) of all shapes.
+    /// Keeps its angle, whatever pushes it.
+    pub fn with_fixed_rotation(self) -> Self {
+        BodyDef { fixed_rotation: true, ..self }
+    }
+
+    /// Mass (kg), center (m, in the body's frame) and inertia (kg·m²): as given, or of all shapes.
     pub fn mass(&self) -> MassProperties {
+        if let Some(given) = self.given_mass {
+            return given;
+        }
         combine(&self.shapes.iter().map(|s| s.shape.mass(s.density)).collect::<Vec<_>>())
     }
 
     /// Checks whether a world accepts this body; returns its mass properties.
     ///
     /// Errors, with field and value: a number that is not finite in `f32`; negative damping; a shape rejected
-    /// by [`ShapeDef::check`]; a dynamic body without shapes, or with a mass or inertia that is zero or not
-    /// finite.
+    /// by [`ShapeDef::check`]; a dynamic body without shapes or given mass, or with a mass or inertia that is zero or
+    /// not finite; a center that is not finite; a belt that is not kinematic.
     pub fn check(&self) -> Result<MassProperties, Error> {
         finite_pair("position", self.position)?;
         finite("angle", self.angle)?;
@@ -234,16 +292,22 @@ impl BodyDef {
             shape.check().map_err(|e| e.within(&format!("shapes[{k}]")))?;
         }
         let mass = self.mass();
+        finite_pair("given_mass.center", mass.center)?;
+        if self.belt && self.kind != BodyKind::Kinematic {
+            return Err(Error::invalid("belt", format!("needs a kinematic body, is {:?}", self.kind)));
+        }
         if self.kind == BodyKind::Dynamic {
-            if self.shapes.is_empty() {
+            if self.shapes.is_empty() && self.given_mass.is_none() {
                 return Err(Error::invalid("shapes", "a dynamic body needs at least one shape, has 0"));
             }
-            for (name, value) in [("mass", mass.mass as f32), ("inertia", mass.inertia as f32)] {
+            let inertia = if self.fixed_rotation { 1.0 } else { mass.inertia as f32 };
+            for (name, value) in [("mass", mass.mass as f32), ("inertia", inertia)] {
                 // The solver stores the reciprocal, so it must be a normal number too.
-                if !(value.is_normal() && value.recip().is_normal()) {
+                if !(value > 0.0 && value.is_normal() && value.recip().is_normal()) {
+                    let place = if self.given_mass.is_some() { "given_mass" } else { "shapes" };
                     let message =
                         format!("the {name} of a dynamic body must be positive and finite, is {value}");
-                    return Err(Error::invalid("shapes", message));
+                    return Err(Error::invalid(place, message));
                 }
             }
         }

@@ -7,7 +7,7 @@ use glam::Vec2;
 
 pub(crate) mod def;
 
-pub use def::{BodyDef, MAX_FRICTION, ShapeDef};
+pub use def::{BodyDef, Filter, MAX_FRICTION, ShapeDef};
 
 /// How a body moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -142,10 +142,11 @@ impl Bodies {
         let moves = if def.kind == BodyKind::Static { 0.0 } else { 1.0 };
         self.velocity_x[i] = (moves * def.velocity[0]) as f32;
         self.velocity_y[i] = (moves * def.velocity[1]) as f32;
-        self.angular_velocity[i] = (moves * def.angular_velocity) as f32;
+        let turns = if def.fixed_rotation { 0.0 } else { moves };
+        self.angular_velocity[i] = (turns * def.angular_velocity) as f32;
         let inverse = |x: f64| if def.kind == BodyKind::Dynamic && x > 0.0 { (1.0 / x) as f32 } else { 0.0 };
         self.inv_mass[i] = inverse(mass.mass);
-        self.inv_inertia[i] = inverse(mass.inertia);
+        self.inv_inertia[i] = if def.fixed_rotation { 0.0 } else { inverse(mass.inertia) };
         (self.force_x[i], self.force_y[i], self.torque[i]) = (0.0, 0.0, 0.0);
         self.gravity_scale[i] = def.gravity_scale as f32;
         self.linear_damping[i] = def.linear_damping as f32;

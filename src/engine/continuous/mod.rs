@@ -74,7 +74,7 @@ pub struct Moving<'w> {
     pub contacts: &'w [Contact],
     /// Overlap that position correction leaves uncorrected (m).
     pub slop: f32,
-    /// Returns whether collisions between two bodies are disabled.
+    /// Returns whether collisions between two shapes are disabled.
     pub apart: &'w dyn Fn([u32; 2]) -> bool,
     pub near: &'w Near<'w>,
     pub joined: &'w EachJoined<'w>,
@@ -162,7 +162,7 @@ impl Continuous {
             let swept = swept(moving, rows, shape as usize);
             let mine = &moving.proxies[shape as usize];
             let mut meet = |other: u32, proxy: &Proxy| {
-                if proxy.may_meet(mine) && !(moving.apart)([proxy.body, body as u32]) {
+                if proxy.may_meet(mine) && !(moving.apart)([other, shape]) {
                     part = part.min(pair(moving, rows, [other, shape], part));
                 }
             };
@@ -194,7 +194,7 @@ impl Continuous {
                 if !proxy.dynamic || proxy.body == body || !proxy.may_meet(mine) {
                     continue;
                 }
-                if !overlap(&swept(moving, rows, other), &own) || (moving.apart)([proxy.body, body]) {
+                if !overlap(&swept(moving, rows, other), &own) || (moving.apart)([other as u32, shape]) {
                     continue;
                 }
                 let part = pair(moving, rows, [other as u32, shape], 1.0);

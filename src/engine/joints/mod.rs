@@ -38,6 +38,7 @@ use crate::bodies::{Bodies, BodyHandle};
 use crate::constraints::joints::JointType;
 use crate::error::Error;
 use glam::{DVec2, Vec2};
+use std::borrow::Cow;
 
 /// Identifies a joint of a world; valid until the joint is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -214,6 +215,34 @@ impl JointKind {
     /// Anchors in the frames of a and b (m).
     pub fn anchors(&self) -> [[f64; 2]; 2] {
         of_kind!(self, joint => joint.anchors(), else [[0.0; 2]; 2])
+    }
+
+    /// The joint that is solved in its place: a hinge or slider whose limits leave no room is a weld.
+    pub(crate) fn solved(&self) -> Cow<'_, JointKind> {
+        let weld = |anchor_a, anchor_b, reference_angle| {
+            Cow::Owned(JointKind::Weld(Weld { anchor_a, anchor_b, reference_angle, ..Weld::default() }))
+        };
+        match self {
+            JointKind::Revolute(Revolute {
+                anchor_a,
+                anchor_b,
+                reference_angle,
+                limits: Some([l, u]),
+                ..
+            }) if l == u => weld(*anchor_a, *anchor_b, reference_angle + l),
+            JointKind::Prismatic(Prismatic {
+                anchor_a,
+                anchor_b,
+                axis,
+                reference_angle,
+                limits: Some([l, u]),
+                ..
+            }) if l == u => {
+                let anchor_a = DVec2::from(*anchor_a) + *l * DVec2::from(*axis).normalize();
+                weld(anchor_a.to_array(), *anchor_b, *reference_angle)
+            }
+            _ => Cow::Borrowed(self),
+        }
     }
 
     pub(crate) fn measure(&self, at: &Measured) -> JointState {

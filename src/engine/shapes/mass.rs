@@ -5,6 +5,9 @@ use std::f64::consts::TAU;
 
 /// Mass (kg), center of mass (m) and inertia about that center (kg·m²).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct MassProperties {
     /// Mass (kg).
     pub mass: f64,

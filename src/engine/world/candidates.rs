@@ -1,7 +1,8 @@
 //! Candidates: pairs of shapes whose bounds overlap, kept while they do.
 
 use super::World;
-use crate::bodies::BodyKind;
+use super::joints::JointSlots;
+use crate::bodies::{BodyKind, Filter};
 use crate::contacts::pair_key;
 use crate::narrowphase::batch::{NO_CONTACT, PairKind};
 use crate::narrowphase::candidate::Candidate;
@@ -9,6 +10,12 @@ use crate::params::SPECULATIVE_DISTANCE;
 
 /// Allowance for rounding in a squared distance (1).
 const REACH_ROUNDING: f32 = 1.0 + 1e-5;
+
+/// Whether a joint or the filters of two shapes keep them from colliding.
+pub(super) fn ignores(joints: &JointSlots, filters: &[Filter], [i, j]: [u32; 2], bodies: [u32; 2]) -> bool {
+    let meet = || filters[i as usize].meets(&filters[j as usize]);
+    joints.keeps_apart(bodies) || (!filters.is_empty() && !meet())
+}
 
 impl World {
     /// Rebuilds the candidates from `self.pairs`; persisting ones keep their contact.
@@ -27,7 +34,7 @@ impl World {
             let bodies = [a, b].map(|shape| self.shape_body[shape as usize]);
             // Two segments never touch.
             let Some(kind) = PairKind::of(sa.class, sb.class) else { continue };
-            if self.joints.keeps_apart(bodies) {
+            if ignores(&self.joints, &self.filters, [a, b], bodies) {
                 continue;
             }
             let key = pair_key(i, j);

@@ -2,12 +2,13 @@
 
 use super::{Surface, World};
 use crate::bodies::def::{finite, finite_pair};
-use crate::bodies::{BodyDef, BodyHandle, BodyKind};
+use crate::bodies::{BodyDef, BodyHandle, BodyKind, Filter};
 use crate::broadphase::Proxy;
 use crate::constraints::kernels::types::ConstraintType;
 use crate::error::Error;
 use crate::shapes::{Aabb, MassProperties, Shape};
 use glam::{DVec2, Vec2};
+use std::f64::consts::TAU;
 use std::hash::{BuildHasher, RandomState};
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -65,6 +66,15 @@ pub(super) struct StandingForces {
     torque: f32,
 }
 
+/// Where a kinematic body is after the next step.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Target {
+    pub(super) body: u32,
+    position: [f64; 2],
+    angle: f64,
+}
+
 /// Bounding box of an empty slot.
 const NOWHERE: Aabb = Aabb { min: Vec2::NAN, max: Vec2::NAN };
 
@@ -107,8 +117,18 @@ impl World {
         let first = self.slots.first_shape[index] as usize;
         for (k, (part, shape)) in body.shapes.iter().zip(shapes).enumerate() {
             self.set_shape(first + k, index, shape, [part.friction, part.restitution].map(|x| x as f32));
+            if part.filter != Filter::default() {
+                self.filters.resize(self.shapes.len(), Filter::default());
+            }
+            if let Some(filter) = self.filters.get_mut(first + k) {
+                *filter = part.filter;
+            }
         }
         self.fat_boxes.set(index, first, &self.shapes[first..first + count as usize]);
+        if !self.filters.is_empty() {
+            self.filters.resize(self.shapes.len(), Filter::default());
+        }
+        self.belts.extend(body.belt.then_some(index as u32));
         self.traits.add(body, self.bodies.round[index]);
         self.features = self.traits.features();
         (self.pairs_are_stale, self.continuous_is_stale, self.lanes_are_for) = (true, true, None);
@@ -192,6 +212,8 @@ impl World {
         let [first, count] = [slots.first_shape[i], slots.shapes[i]].map(|k| k as usize);
         self.leave_world(i, first, count);
         self.applied.retain(|standing| standing.body != body.index);
+        self.belts.retain(|&belt| belt != body.index);
+        self.targets.retain(|target| target.body != body.index);
         (self.pairs_are_stale, self.continuous_is_stale, self.lanes_are_for) = (true, true, None);
         Ok(())
     }
@@ -254,6 +276,40 @@ impl World {
         Ok(())
     }
 
+    /// Moves a kinematic body to a pose in the next step, at the velocity that this takes; what it meets on its way
+    /// is pushed. It then rests there. Position in m, angle in rad; it turns the shorter way.
+    ///
+    /// Errors: the body was removed; it is not kinematic; a value that is not finite.
+    ///
+    /// ```
+    /// # use simpulse_engine::prelude::*;
+    /// # let mut world = World::default();
+    /// let lift = BodyDef::kinematic([0.0, 0.0]).with(ShapeDef::rectangle(2.0, 0.1)?);
+    /// let lift = world.add_body(&lift)?;
+    /// world.move_to(lift, [0.0, 0.05], 0.01)?;
+    /// world.step()?;
+    /// assert_eq!(world.body(lift)?.position(), [0.0, 0.05]);
+    /// assert_eq!(world.body(lift)?.velocity(), [0.0; 2]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn move_to(&mut self, body: BodyHandle, position: [f64; 2], angle: f64) -> Result<(), Error> {
+        let i = self.index_of(body)?;
+        finite_pair("position", position)?;
+        finite("angle", angle)?;
+        self.settings.check()?;
+        if self.bodies.kind[i] != BodyKind::Kinematic {
+            return Err(Error::invalid(format!("body {i}"), "is not kinematic"));
+        }
+        let dt = f64::from(self.settings.dt);
+        let center = DVec2::from_angle(angle).rotate(self.bodies.local_center[i].as_dvec2());
+        let way = DVec2::from(position) + center - DVec2::from(self.bodies.center(i));
+        let turn = angle - f64::from(self.bodies.angle(i));
+        let turn = turn - (turn / TAU).round() * TAU;
+        self.set_velocity(body, (way / dt).to_array(), turn / dt)?;
+        self.targets.push(Target { body: body.index, position, angle });
+        Ok(())
+    }
+
     /// Sets the collision group of a body; bodies of the same non-zero group do not collide. Errors: the body was removed.
     pub fn set_group(&mut self, body: BodyHandle, group: i32) -> Result<(), Error> {
         let i = self.index_of(body)?;
@@ -264,7 +320,7 @@ impl World {
         Ok(())
     }
 
-    /// Sets the velocity of a body's center of mass (m/s) and its spin (rad/s).
+    /// Sets the velocity of a body's center of mass (m/s) and its spin (rad/s). Cancels [`World::move_to`].
     ///
     /// Errors: the body was removed; it is static; a value that is not finite.
     pub fn set_velocity(&mut self, body: BodyHandle, velocity: [f64; 2], spin: f64) -> Result<(), Error> {
@@ -274,6 +330,7 @@ impl World {
         if self.bodies.kind[i] == BodyKind::Static {
             return Err(Error::invalid(format!("body {i}"), "is static and has no velocity"));
         }
+        self.targets.retain(|target| target.body != body.index);
         [self.bodies.velocity_x[i], self.bodies.velocity_y[i]] = velocity.map(|x| x as f32);
         self.bodies.angular_velocity[i] = spin as f32;
         Ok(())
@@ -356,12 +413,17 @@ impl World {
         Ok(())
     }
 
-    /// After a step: restores persistent forces and frees the indices of removed bodies.
+    /// After a step: restores persistent forces, ends moves of kinematic bodies and frees the indices of removed bodies.
     pub(super) fn end_edits(&mut self) {
         while let Some(StandingForces { body, force, torque }) = self.applied.pop() {
             let i = body as usize;
             (self.bodies.force_x[i], self.bodies.force_y[i]) = (force.x, force.y);
             self.bodies.torque[i] = torque;
+        }
+        while let Some(Target { body, position, angle }) = self.targets.pop() {
+            let (i, b) = (body as usize, &mut self.bodies);
+            b.place(i, position, angle, b.local_center[i].as_dvec2().to_array());
+            (b.velocity_x[i], b.velocity_y[i], b.angular_velocity[i]) = (0.0, 0.0, 0.0);
         }
         self.slots.free.append(&mut self.slots.removed);
     }

@@ -1,6 +1,7 @@
 //! Adding, changing, removing and reading joints.
 
 use super::World;
+use super::candidates::ignores;
 use crate::bodies::{Bodies, BodyHandle};
 use crate::constraints::joints::Joints;
 use crate::constraints::kernels::types::{BodyStates, ConstraintSet, ConstraintType, RecordedImpulses};
@@ -172,14 +173,15 @@ impl World {
             }
             None => (&[][..], 0.0),
         };
+        let solved = joint.kind.solved();
         let angle = f64::from(self.bodies.angle(ends[1])) - f64::from(self.bodies.angle(ends[0]));
-        let angle = angle - reference(&joint.kind);
+        let angle = angle - reference(&solved);
         let turns = ((last - angle) / std::f64::consts::TAU).round();
-        let angle = angle + turns * std::f64::consts::TAU;
+        let angle = angle + turns * std::f64::consts::TAU + (reference(&solved) - reference(&joint.kind));
         let at = measured(&self.bodies, ends, joint.kind.anchors(), angle);
         let mut state = joint.kind.measure(&at);
         if !kept.is_empty() {
-            let ((linear, angular), h) = (joint.kind.impulse(kept, &at), f64::from(self.settings.h()));
+            let ((linear, angular), h) = (solved.impulse(kept, &at), f64::from(self.settings.h()));
             (state.force, state.torque) = ((linear / h).to_array(), angular / h);
         }
         let load = state.load();
@@ -259,10 +261,11 @@ impl World {
         solved
     }
 
-    /// Whether a joint keeps two bodies from colliding. A removed or changed joint still does until the next
-    /// step.
-    pub fn keeps_apart(&self, a: usize, b: usize) -> bool {
-        self.joints.keeps_apart([a as u32, b as u32])
+    /// Whether a joint or filters keep two shapes from colliding. A removed or changed joint still does until the
+    /// next step.
+    pub fn keeps_apart(&self, shapes: [u32; 2]) -> bool {
+        let bodies = shapes.map(|shape| self.shape_body[shape as usize]);
+        ignores(&self.joints, &self.filters, shapes, bodies)
     }
 
     fn check_joint(&self, joint: &Joint) -> Result<(), Error> {
@@ -327,14 +330,15 @@ impl World {
             let Some(joint) = &self.joints.joints[index] else { continue };
             keep_apart(&mut self.joints.apart, joint);
             let [a, b] = [joint.a.index() as u32, joint.b.index() as u32];
-            let key = (joint.kind.name(), joint.kind.form(), !self.bodies.is_dynamic(b as usize));
+            let solved = joint.kind.solved();
+            let key = (solved.name(), solved.form(), !self.bodies.is_dynamic(b as usize));
             let was = place.map(|[group, i]| (&old[group as usize - first].kind, i as usize));
             let (kept, angle) = match (was, self.joints.read.get(index)) {
                 (Some((kind, i)), _) => (kind.impulses(i), kind.angle(i)),
                 (None, Some((kept, angle))) => (&kept[..], *angle),
                 (None, None) => (&[][..], 0.0),
             };
-            of_kind!(&joint.kind, definition => {
+            of_kind!(&*solved, definition => {
                 let group = keys.iter().position(|k| *k == key).unwrap_or_else(|| {
                     keys.push(key);
                     self.work.types.push(ConstraintSet::new(empty(definition, key.2, of_substep)));

@@ -4,7 +4,7 @@
 //! bounds → pairs → manifolds → colors → records → solver stages → impulses, poses
 //! ```
 
-use crate::bodies::Bodies;
+use crate::bodies::{Bodies, Filter};
 use crate::broadphase::{BroadPhase, FatBoxes, Proxy, Region};
 use crate::clock::{Clock, Phase, Timings};
 use crate::constraints::kernels::motion::{self, MotionInput};
@@ -20,8 +20,9 @@ use crate::narrowphase::seams::Seams;
 use crate::params::DIVERGED_SPEED;
 use crate::shapes::Shape;
 use crate::solvers::{self, Variant};
+use candidates::ignores;
 use collide::Narrow;
-use edit::{Slots, StandingForces};
+use edit::{Slots, StandingForces, Target};
 use events::Events;
 use joints::JointSlots;
 use std::fmt;
@@ -102,6 +103,10 @@ pub struct World {
     pub bodies: Bodies,
     shapes: Vec<Shape>,
     shape_body: Vec<u32>,
+    /// `[shapes]`; empty while all are [`Filter::default`].
+    filters: Vec<Filter>,
+    /// Bodies whose velocity does not move them, see [`BodyDef::belt`](crate::bodies::BodyDef::belt).
+    belts: Vec<u32>,
     /// Contacts of the last step with at least one point, sorted by shape pair.
     pub contacts: Vec<Contact>,
     /// Settings of the run.
@@ -141,6 +146,8 @@ pub struct World {
     slots: Slots,
     /// Persistent forces to restore before the next step.
     applied: Vec<StandingForces>,
+    /// Poses of kinematic bodies after the next step.
+    targets: Vec<Target>,
     events: Events,
     joints: JointSlots,
 }
@@ -171,6 +178,8 @@ impl World {
             bodies: Bodies::default(),
             shapes: Vec::new(),
             shape_body: Vec::new(),
+            filters: Vec::new(),
+            belts: Vec::new(),
             contacts: Vec::new(),
             broadphase: BroadPhase::new(settings.broadphase),
             timings: Timings::default(),
@@ -197,6 +206,7 @@ impl World {
             work: Workspace::default(),
             slots: Slots::new(),
             applied: Vec::new(),
+            targets: Vec::new(),
             events: Events::default(),
             joints: JointSlots::default(),
             settings,
@@ -238,6 +248,9 @@ impl World {
     /// Writes velocities and displacements of the rows back to the bodies.
     fn store(&mut self) {
         self.work.motion.finish(&mut self.work.rows);
+        for &belt in &self.belts {
+            self.work.rows[belt as usize].delta[..3].fill(0.0);
+        }
         if self.settings.continuous {
             let World {
                 bodies,
@@ -247,6 +260,8 @@ impl World {
                 contacts,
                 slots,
                 joints,
+                filters,
+                shape_body,
                 broadphase,
                 work,
                 settings,
@@ -266,7 +281,7 @@ impl World {
                 proxies,
                 contacts,
                 slop: Margins::of(settings.length_unit).slop,
-                apart: &|pair| joints.keeps_apart(pair),
+                apart: &|pair| ignores(joints, filters, pair, pair.map(|i| shape_body[i as usize])),
                 near: &|area, visit| {
                     broadphase.visit(proxies, &mut Region::area(area), |_, shape| visit(shape));
                 },

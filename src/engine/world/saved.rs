@@ -3,12 +3,12 @@
 //! Not saved: constraints of the caller's own types (a world with any is an error), and the chains and jams of `shim`.
 //! All other solvers continue bit-identically.
 
-use super::edit::{Slots, StandingForces};
+use super::edit::{Slots, StandingForces, Target};
 use super::events::Events;
 use super::joints::SavedJoints;
 use super::traits::Traits;
 use super::{Settings, World};
-use crate::bodies::{Bodies, BodyDef};
+use crate::bodies::{Bodies, BodyDef, Filter};
 use crate::constraints::records::kept::SolverState;
 use crate::contacts::Contact;
 use crate::lanes::LaneWidth;
@@ -73,6 +73,12 @@ struct SavedWorld {
     #[serde(default)]
     found: Vec<Found>,
     applied: Vec<StandingForces>,
+    #[serde(default)]
+    targets: Vec<Target>,
+    #[serde(default)]
+    filters: Vec<Filter>,
+    #[serde(default)]
+    belts: Vec<u32>,
     events: Events,
     traits: Traits,
     #[serde(default)]
@@ -99,6 +105,9 @@ impl Serialize for World {
             found: self.narrow.found.clone(),
             of_solver: self.solver.kept(),
             applied: self.applied.clone(),
+            targets: self.targets.clone(),
+            filters: self.filters.clone(),
+            belts: self.belts.clone(),
             events: self.events.clone(),
             traits: self.traits,
             joints: SavedJoints::of(self),
@@ -155,12 +164,19 @@ impl SavedWorld {
         if !self.kept.is_consistent() {
             return Err("kept: as many numbers as names".into());
         }
+        if !self.filters.is_empty() && self.filters.len() != shapes {
+            return Err(format!("{} filters of {shapes} shapes", self.filters.len()));
+        }
         if !self.found.is_empty() && self.found.len() != self.contacts.len() {
             return Err(format!("found: {} entries for {} contacts", self.found.len(), self.contacts.len()));
         }
         let is_body = |&i: &u32| (i as usize) < n;
         let mut named = s.free.iter().chain(&s.removed);
-        if !named.all(is_body) || !self.applied.iter().all(|standing| is_body(&standing.body)) {
+        if !named.all(is_body)
+            || !self.applied.iter().all(|standing| is_body(&standing.body))
+            || !self.targets.iter().all(|target| is_body(&target.body))
+            || !self.belts.iter().all(is_body)
+        {
             return Err(format!("a body that is none of {n}"));
         }
         let is_one = |c: &Contact| {
@@ -194,6 +210,7 @@ impl SavedWorld {
         (world.step_index, world.traits) = (self.step_index, self.traits);
         world.features = world.traits.features();
         (world.applied, world.events, world.impulses_of) = (self.applied, self.events, self.impulses_of);
+        (world.targets, world.filters, world.belts) = (self.targets, self.filters, self.belts);
         world.narrow.found = self.found;
         if self.kept.size() == world.solver_is.kept {
             world.work.kept = self.kept;

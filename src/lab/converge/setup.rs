@@ -19,16 +19,10 @@ pub(super) fn bodies(problem: &ContactProblem, pushed: bool) -> Bodies {
         let [vx, vy, w] = if pushed { b.velocity } else { b.free_velocity };
         let def = BodyDef {
             kind: if moves { BodyKind::Dynamic } else { BodyKind::Kinematic },
-            position: [0.0; 2],
-            angle: 0.0,
             velocity: [vx, vy],
             angular_velocity: w,
             gravity_scale: 0.0,
-            linear_damping: 0.0,
-            angular_damping: 0.0,
-            group: 0,
-            bullet: false,
-            shapes: Vec::new(),
+            ..BodyDef::dynamic([0.0; 2])
         };
         // Zero inverses become infinite masses, which become zero inverses again.
         let mass = MassProperties { mass: 1.0 / b.inv_mass, inertia: 1.0 / b.inv_inertia, center: [0.0; 2] };

@@ -29,7 +29,7 @@ impl Default for Overlaps {
 impl Overlaps {
     /// Calls `each` with every pair of shapes within contact distance, ascending by
     /// [pair](crate::engine::contacts::pair_key). The order in a pair is that of a contact: the second shape
-    /// is that of a dynamic body. Pairs that a joint keeps apart are left out.
+    /// is that of a dynamic body. Pairs that a joint or filters keep apart are left out.
     pub fn find(&mut self, world: &World, mut each: impl FnMut([u32; 2], &Manifold)) {
         let (bodies, near) = (&world.bodies, SPECULATIVE_DISTANCE * world.settings.length_unit);
         // Bounds are relative to the first body: far from the origin they would lose precision.
@@ -47,7 +47,7 @@ impl Overlaps {
         for &[i, j] in &self.pairs {
             let [a, b] = if self.proxies[j as usize].dynamic { [i, j] } else { [j, i] };
             let [body_a, body_b] = [a, b].map(|s| world.shape_body()[s as usize] as usize);
-            if world.keeps_apart(body_a, body_b) {
+            if world.keeps_apart([a, b]) {
                 continue;
             }
             let [pose_a, pose_b] = bodies.relative_poses(body_a, body_b);

@@ -157,6 +157,9 @@ fn body_def(body: &SceneBody) -> Result<BodyDef, Error> {
         angular_damping: body.angular_damping,
         group: body.group,
         bullet: body.bullet,
+        fixed_rotation: body.fixed_rotation,
+        belt: body.belt,
+        given_mass: body.mass,
         shapes: shapes.collect::<Result<_, _>>()?,
     };
     def.check()?;
@@ -164,12 +167,13 @@ fn body_def(body: &SceneBody) -> Result<BodyDef, Error> {
 }
 
 /// The definition of a shape. Errors name places within the shape.
-fn shape_def(shape: &SceneShape) -> Result<ShapeDef, Error> {
+pub(super) fn shape_def(shape: &SceneShape) -> Result<ShapeDef, Error> {
     Ok(ShapeDef {
         shape: geometry(&shape.geometry)?,
         density: shape.density,
         friction: shape.friction,
         restitution: shape.restitution,
+        filter: shape.filter,
     })
 }
 

@@ -154,6 +154,13 @@ impl KnownValue {
 ///
 /// Errors: an unknown scene of the catalog.
 pub fn loaded(scene: Scene) -> Result<Loaded, Error> {
+    let left_out = scene.left_out.clone();
+    let mut loaded = expected(scene)?;
+    loaded.unchecked.extend(left_out.into_iter().map(|what| format!("{what}: left out of the file")));
+    Ok(loaded)
+}
+
+fn expected(scene: Scene) -> Result<Loaded, Error> {
     let Some(expect) = scene.expect.clone() else {
         let tolerances = Tolerances::standard(&scene);
         let nothing = "conditions and reference values: the file has none (expect)".to_string();

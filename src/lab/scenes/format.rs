@@ -5,9 +5,11 @@
 //! reading it back therefore gives the same bits.
 
 use super::expect::Expect;
+use super::import;
 use super::joints::SceneJoint;
-use crate::engine::bodies::BodyKind;
+use crate::engine::bodies::{BodyKind, Filter};
 use crate::engine::params::{DEFAULT_DENSITY, DEFAULT_DT, DEFAULT_FRICTION, DEFAULT_GRAVITY};
+use crate::engine::shapes::MassProperties;
 use crate::lab::error::Error;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -61,6 +63,9 @@ pub struct Scene {
     /// Joints between them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<SceneJoint>,
+    /// What the file of another program has and this scene has not, with counts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<String>,
 }
 
 /// One body of a scene.
@@ -96,6 +101,15 @@ pub struct SceneBody {
     /// Whether dynamic bodies stop it, too, if it is fast and continuous collision is on.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub bullet: bool,
+    /// Whether it keeps its angle.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub fixed_rotation: bool,
+    /// Whether its velocity is that of its surface only, see [`BodyDef::belt`](crate::engine::bodies::BodyDef::belt).
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub belt: bool,
+    /// Mass (kg), center (m) and inertia about it (kg·m²), in place of those of the shapes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass: Option<MassProperties>,
     /// Shapes that move as one.
     pub shapes: Vec<SceneShape>,
 }
@@ -116,6 +130,9 @@ pub struct SceneShape {
     /// Restitution, in [0, 1]; two surfaces mix as max(ea, eb).
     #[serde(default, skip_serializing_if = "is_zero")]
     pub restitution: f64,
+    /// What it collides with.
+    #[serde(default, skip_serializing_if = "is_no_filter")]
+    pub filter: Filter,
 }
 
 /// The area that a shape covers (m, rad).
@@ -198,10 +215,19 @@ pub struct SegmentGeometry {
 impl Scene {
     /// Reads a scene; `path` only names the text in errors.
     ///
+    /// Files of R.U.B.E., b2dJson and planck.js are recognized; see [`Scene::left_out`].
+    ///
     /// Errors: text that is not JSON of this form, with place, line and column; a value out of range
     /// ([`Scene::validate`]), with its place.
     pub fn from_json(text: &str, path: &Path) -> Result<Self, Error> {
         let failed = |message| Error::Format { path: path.to_path_buf(), message };
+        if let Some(file) = import::of_others(text) {
+            let name = path.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
+            let scene = import::scene(&file, &name);
+            return scene
+                .and_then(|scene| scene.validate().map(|()| scene))
+                .map_err(|e| failed(e.to_string()));
+        }
         let mut reader = serde_json::Deserializer::from_str(text);
         let scene: Scene =
             serde_path_to_error::deserialize(&mut reader).map_err(|e| failed(at_place(text, &e)))?;
@@ -302,6 +328,10 @@ fn is_origin(point: &[f64; 2]) -> bool {
 
 fn is_no_group(group: &i32) -> bool {
     *group == 0
+}
+
+fn is_no_filter(filter: &Filter) -> bool {
+    *filter == Filter::default()
 }
 
 fn is_default_density(value: &f64) -> bool {

@@ -20,6 +20,7 @@ mod format;
 mod free;
 mod friction_ramp;
 pub mod holds;
+mod import;
 mod incline;
 mod joints;
 mod junkyard;

@@ -8,7 +8,7 @@ pub(super) use super::tolerance::Tolerances;
 pub(super) use super::truth::by_hand;
 pub(super) use super::truth::*;
 pub(super) use super::{Entry, MASS_RATIO};
-pub(super) use crate::engine::bodies::BodyKind;
+pub(super) use crate::engine::bodies::{BodyKind, Filter};
 use crate::engine::params::{DEFAULT_DENSITY, DEFAULT_DT, DEFAULT_FRICTION, DEFAULT_GRAVITY};
 pub(super) use crate::engine::world::World;
 pub(super) use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI, TAU};
@@ -28,6 +28,7 @@ impl Scene {
             expect: None,
             bodies,
             joints: Vec::new(),
+            left_out: Vec::new(),
         }
     }
 
@@ -61,6 +62,9 @@ impl SceneBody {
             angular_damping: 0.0,
             group: 0,
             bullet: false,
+            fixed_rotation: false,
+            belt: false,
+            mass: None,
             shapes: vec![shape],
         }
     }
@@ -89,7 +93,13 @@ impl SceneBody {
 impl SceneShape {
     /// A shape with the default surface.
     pub fn new(geometry: Geometry) -> Self {
-        Self { geometry, density: DEFAULT_DENSITY, friction: DEFAULT_FRICTION, restitution: 0.0 }
+        Self {
+            geometry,
+            density: DEFAULT_DENSITY,
+            friction: DEFAULT_FRICTION,
+            restitution: 0.0,
+            filter: Filter::default(),
+        }
     }
 
     /// A disc about the origin (m).

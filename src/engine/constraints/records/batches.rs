@@ -23,6 +23,8 @@ pub(crate) struct Place {
 pub struct Batches {
     width: usize,
     segments: Vec<Segment>,
+    /// `segments` in the order of their lanes.
+    by_lane: Vec<Segment>,
     /// `segments` in the order of a sweep. Passes run over those in `focus`.
     visits: Vec<Segment>,
     focus: Range<usize>,
@@ -147,6 +149,14 @@ impl Batches {
         &self.segments
     }
 
+    /// The segment of a lane.
+    ///
+    /// # Panics
+    /// If there is no such lane.
+    pub(crate) fn segment_of(&self, lane: usize) -> &Segment {
+        &self.by_lane[self.by_lane.partition_point(|segment| segment.first_lane <= lane) - 1]
+    }
+
     /// Segments that a pass runs over, in order. All of them, unless [`Self::arrange`] selected others.
     pub fn visits(&self) -> &[Segment] {
         &self.visits[self.focus.clone()]
@@ -238,6 +248,7 @@ impl Batches {
         assert!(width > 0, "batches without lanes");
         self.width = width;
         self.segments.clear();
+        self.by_lane.clear();
         self.visits.clear();
         (self.focus, self.order) = (0..0, SweepOrder::Forward);
         self.contact.clear();
@@ -341,6 +352,7 @@ impl Batches {
             disjoint,
         };
         self.segments.push(segment);
+        self.by_lane.push(segment);
         self.visits.push(segment);
         (self.focus, self.order) = (0..self.visits.len(), SweepOrder::Forward);
         self.vectors += batches * stride;

@@ -7,7 +7,6 @@ use crate::constraints::kernels::frame::turn;
 use crate::constraints::kernels::types::ConstraintSet;
 use crate::constraints::records::batches::Batches;
 use crate::constraints::records::features::{Features, Layout};
-use crate::constraints::records::segment::Segment;
 use crate::contacts::Contact;
 use crate::lanes::{BodyRow, Lanes};
 use crate::narrowphase::lanes::PoseRow;
@@ -138,9 +137,7 @@ impl PropagationInput<'_> {
     pub(super) fn place(&self, lane: u32) -> LanePlace {
         let (part, of) = self.part_of(lane);
         let (batches, width) = (&self.batches[part], self.batches[part].width());
-        // They are in the order of sweeps, not of lanes.
-        let holds = |s: &&Segment| (s.first_lane..s.first_lane + s.batches * width).contains(&of);
-        let segment = batches.segments().iter().find(holds).expect("a segment for each lane");
+        let segment = batches.segment_of(of);
         let in_segment = of - segment.first_lane;
         let vector = segment.first_vector + in_segment / width * segment.stride;
         let layout = Layout::for_features(self.features, segment.partner);
