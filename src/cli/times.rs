@@ -3,10 +3,9 @@
 use crate::engine::clock::Phase;
 use crate::engine::world::{Settings, StepCounts, World};
 use crate::lab::error::Error;
-use crate::lab::profile::waiting;
 use crate::lab::scenes::Scene;
 use crate::lab::study::interleave::time_in_turns;
-use crate::lab::study::sample::{Sample, median};
+use crate::lab::study::sample::{BUSY, Sample, median};
 use crate::lab::units::{digits, si};
 use std::time::{Duration, Instant};
 
@@ -94,7 +93,7 @@ impl Times {
     /// Warnings about the quality of the times.
     pub fn note(&self) -> String {
         let mut text = String::new();
-        if self.sample.waited >= waiting::BUSY {
+        if self.sample.waited >= BUSY {
             text += &format!(
                 "the timed thread waited for a processor {:.0} % of the time; waiting is not counted\n",
                 100.0 * self.sample.waited

@@ -292,7 +292,7 @@ fn a_small_study_leaves_whole_files() {
     let answer = succeeds(folder.path(), &format!("study {options}"));
     let out = folder.path().join("a/b");
     let kept: Vec<String> = entries(&out).into_iter().filter(|n| !n.starts_with("replay-")).collect();
-    let names = ["report.html", "study.csv", "study.json", "tables.txt"];
+    let names = ["report.html", "study.csv", "study.json", "tables.txt", "tidy.csv"];
     assert_eq!(kept, names);
 
     let mut reader = csv::Reader::from_path(out.join("study.csv")).unwrap();

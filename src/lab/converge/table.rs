@@ -5,8 +5,8 @@ use super::warm::{OFF, WarmStartSource};
 use super::{ConvergeReport, Reached, ReplayCurve, TOLERANCES};
 use crate::lab::error::Error;
 use crate::lab::reference::certify::Uniqueness;
-use crate::lab::report::table::{finish, table};
 use crate::lab::units::{lanes, percent, si};
+use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
 
 /// Shown for a force error that is not reached.
@@ -149,7 +149,8 @@ fn table_of(rows: &[SolverRow]) -> String {
         "v error".to_string(),
         "time of an\niteration".to_string(),
     ];
-    let mut cells = table(&head.each_ref().map(String::as_str));
+    let mut cells = Table::new();
+    cells.load_style(presets::NOTHING).set_header(head);
     for row in rows {
         let mut line = vec![row.name.clone()];
         for (at, start) in TOLD.into_iter().flat_map(|at| [(at, 0), (at, 1)]) {
@@ -168,7 +169,11 @@ fn table_of(rows: &[SolverRow]) -> String {
         line.push(of(last.and_then(|(curve, _)| curve.iteration).map(|time| si(1e-9 * time.median_ns, "s"))));
         cells.add_row(line);
     }
-    finish(cells, 1)
+    for (i, column) in cells.column_iter_mut().enumerate() {
+        column.set_padding((0, 2));
+        column.set_cell_alignment(if i == 0 { CellAlignment::Left } else { CellAlignment::Right });
+    }
+    cells.to_string().lines().map(|line| line.trim_end().to_string() + "\n").collect()
 }
 
 /// The rate of Gauss–Seidel.

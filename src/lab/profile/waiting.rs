@@ -2,6 +2,7 @@
 //! running.
 
 pub use crate::engine::clock::waited;
+use crate::lab::study::sample::BUSY;
 use std::time::Duration;
 
 /// Fraction of `elapsed` in which the thread waited since `before`.
@@ -9,9 +10,6 @@ pub fn share(before: Option<Duration>, elapsed: Duration) -> Option<f64> {
     let waiting = waited()?.saturating_sub(before?);
     Some(waiting.as_secs_f64() / elapsed.as_secs_f64().max(1e-9))
 }
-
-/// Waiting below this fraction of the time is not mentioned (1).
-pub const BUSY: f64 = 0.05;
 
 /// A line for reports; empty if there is nothing to report.
 pub fn note(share: Option<f64>) -> String {

@@ -7,13 +7,13 @@ use super::environment::Environment;
 use super::units::{count as number, digits, is_emulated, order as order_name};
 use crate::engine::solvers::DEFAULT;
 use crate::engine::world::Order;
-use crate::lab::profile::waiting::BUSY;
 use crate::lab::scenes::kind::SceneKind;
 use crate::lab::scenes::tolerance::Accuracy;
 use crate::lab::study::answer::{Answer, each_setting, fails_last, order};
 use crate::lab::study::compare::{Ratio, TIE};
 use crate::lab::study::curve::{ErrorAxis, distinct, solvers_of};
 use crate::lab::study::ranking::{Ranking, Standing, ranking};
+use crate::lab::study::sample::BUSY;
 use crate::lab::study::{self, Record};
 
 const MOST_RANKED: usize = 8;

@@ -3,6 +3,9 @@
 use crate::engine::clock::Phase;
 use crate::engine::world::StepCounts;
 
+/// Waiting below this fraction of the time is not mentioned (1).
+pub const BUSY: f64 = 0.05;
+
 /// Number of passes at which the median over them starts to tell recurring spikes from single ones.
 const REPEATED: u32 = 3;
 
