@@ -146,7 +146,10 @@ fn filters_decide_what_collides() {
         (0..30).for_each(|_| world.step().unwrap());
         let height = |body| world.body(body).unwrap().position()[1];
         assert!(height(both) > -0.3, "{}: {}", variant.name, height(both));
-        assert!(height(own_mask) < -15.0 && height(its_mask) < -25.0, "{}", variant.name);
+        // Both pass the first ground and lie on the second, which collides with all.
+        for height in [own_mask, its_mask].map(height) {
+            assert!((height + 19.5).abs() < 0.3, "{}: {height}", variant.name);
+        }
     }
 }
 
@@ -243,7 +246,8 @@ fn a_belt_carries_and_stays() {
         let belt = world.add_body(&BodyDef { belt: true, ..belt.with_velocity([1.5, 0.0]) }).unwrap();
         let cargo = world.add_body(&box_at([-5.0, 0.5])).unwrap();
         (0..90).for_each(|_| world.step().unwrap());
-        assert_eq!(world.body(belt).unwrap().position(), [0.0, -0.5], "{}", variant.name);
+        let [x, y] = world.body(belt).unwrap().position();
+        assert!(x.abs() < 1e-12 && (y + 0.5).abs() < 1e-12, "{}: {x}, {y}", variant.name);
         let cargo = world.body(cargo).unwrap();
         assert!((cargo.velocity()[0] - 1.5).abs() < 0.03, "{}: {:?}", variant.name, cargo.velocity());
         assert!((cargo.position()[1] - 0.5).abs() < 0.05, "{}: {:?}", variant.name, cargo.position());

@@ -58,14 +58,14 @@ pub struct Scene {
     /// Conditions on a run; `None` if it is not checked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expect: Option<Expect>,
+    /// What the file of another program has and this scene has not, with counts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<String>,
     /// Bodies, in the order of their indices in a world.
     pub bodies: Vec<SceneBody>,
     /// Joints between them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<SceneJoint>,
-    /// What the file of another program has and this scene has not, with counts.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub left_out: Vec<String>,
 }
 
 /// One body of a scene.

@@ -43,7 +43,7 @@ mod tests {
     fn momentum_is_the_sum_of_mass_times_velocity() {
         let mut bodies = by_hand::bodies(&[[0.0, 0.0], [5.0, 0.0]]);
         for (i, (inv_mass, v)) in [(0.5, [3.0, 1.0]), (0.25, [-1.0, 0.5])].into_iter().enumerate() {
-            bodies.inv_mass.push(inv_mass);
+            bodies.inv_mass[i] = inv_mass;
             (bodies.velocity_x[i], bodies.velocity_y[i]) = (v[0], v[1]);
         }
         assert_eq!(momentum(&by_hand::view(&bodies, 1)), [2.0, 4.0]);
