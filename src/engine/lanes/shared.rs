@@ -16,7 +16,7 @@ const LEAST_PART: usize = 256;
 
 /// Records that may be shared by threads, each of which gathers and scatters records of its own.
 ///
-/// They come from a mutable slice, so there is no other access to them. Copies stay in their thread, until [`Self::share`].
+/// They come from a mutable slice, so there is no other access to them. Copies stay in their thread, unless `share` sends them.
 pub struct Shared<'a, T> {
     first: *mut T,
     len: usize,

@@ -403,7 +403,7 @@ pub fn open_scene(
 }
 
 /// Name and seed of a member of an ensemble, `arch@3`: a scene from a seed. Scenes without a random element differ by
-/// the velocities with which bodies start, see [`DISTURBANCE`].
+/// the velocities with which bodies start, see `DISTURBANCE`.
 pub fn seed_of(name: &str) -> Option<(&str, u64)> {
     let (whole, seed) = name.rsplit_once('@')?;
     Some((whole, seed.parse().ok()?))
