@@ -108,18 +108,29 @@ impl Workers {
     }
 
     /// Runs `each` on every part, and returns when all are done. Parts beyond the number of threads wait for a thread.
-    pub fn each<P: Send>(&self, parts: impl Iterator<Item = P>, each: impl Fn(P) + Sync) {
+    pub fn each<P: Send>(&self, mut parts: impl Iterator<Item = P>, each: impl Fn(P) + Sync) {
+        if self.count() == 1 {
+            return parts.for_each(each);
+        }
+        self.each_shared(&mut parts, &each);
+    }
+
+    /// As [`Self::each`] with several threads. Compiled once per type of parts, not per task.
+    fn each_shared<P: Send>(&self, parts: &mut dyn Iterator<Item = P>, each: &(dyn Fn(P) + Sync)) {
         // Few threads need little room.
         match self.count() {
-            1 => parts.for_each(each),
-            2 => self.each_of::<2, P>(parts, each),
+            ..=2 => self.each_of::<2, P>(parts, each),
             3..=8 => self.each_of::<8, P>(parts, each),
             _ => self.each_of::<MOST_THREADS, P>(parts, each),
         }
     }
 
-    /// As [`Self::each`], with `N` threads at most.
-    fn each_of<const N: usize, P: Send>(&self, mut parts: impl Iterator<Item = P>, each: impl Fn(P) + Sync) {
+    /// As [`Self::each_shared`], with `N` threads at most.
+    fn each_of<const N: usize, P: Send>(
+        &self,
+        parts: &mut dyn Iterator<Item = P>,
+        each: &(dyn Fn(P) + Sync),
+    ) {
         loop {
             let mut count = 0;
             let taken: [Mutex<Option<P>>; N] = std::array::from_fn(|i| {
@@ -135,7 +146,7 @@ impl Workers {
                 _ => self.run(&|number| {
                     for i in (number..N).chain(0..number) {
                         let part = taken[i].lock().unwrap_or_else(PoisonError::into_inner).take();
-                        part.into_iter().for_each(&each);
+                        part.into_iter().for_each(each);
                     }
                 }),
             }

@@ -310,7 +310,7 @@ impl PlotFrame<'_> {
             write(area, label, (left - 6, at), TICK, HPos::Right)?;
         }
         // As many labels as fit without overlap, and none below the strip.
-        let half = |label: &str| 3 + (3.2 * label.chars().count() as f64) as i32;
+        let half = |label: &str| 3 + width_of(label) / 2;
         let mut free = i32::MIN;
         for (value, label) in &x.scale.ticks {
             let at = self.across(*value);
@@ -399,6 +399,19 @@ fn write(area: &PlotArea, text: &str, at: Pixel, size: i32, anchor: HPos) -> Dra
 /// Height of labels (pixels).
 const LABEL: i32 = 11;
 
+/// The most that a label is wide (pixels): the advances of DejaVu Sans, the widest common sans-serif font.
+fn width_of(label: &str) -> i32 {
+    let advance = |c: char| match c {
+        ' ' | '.' | ',' | '·' | ':' | 'i' | 'j' | 'l' => 0.34,
+        '(' | ')' | '-' | 'f' | 'r' | 't' => 0.42,
+        'a'..='z' if c != 'm' && c != 'w' => 0.64,
+        '0'..='9' => 0.64,
+        '@' | 'm' | 'M' | 'W' | '%' => 1.0,
+        _ => 0.84,
+    };
+    (label.chars().map(advance).sum::<f64>() * f64::from(TICK) / 1.24).ceil() as i32
+}
+
 /// Places labels next to marks where there is room.
 #[derive(Default)]
 struct Labels {
@@ -416,7 +429,7 @@ impl Labels {
         label: &str,
         frame: &PlotFrame,
     ) -> Option<(Pixel, Option<Pixel>)> {
-        let (width, half) = (6 * label.chars().count() as i32, LABEL / 2);
+        let (width, half) = (width_of(label), LABEL / 2);
         // Only a large chart has room for labels far away.
         let most = if frame.chart.size[0] > 600 { 4 } else { 1 };
         for away in [r + 3, 40, 80, 130].into_iter().take(most) {

@@ -75,9 +75,20 @@ pub(crate) fn over_color<L: Lanes, N: KernelFeatures, O: Partner>(
     if count == 1 {
         return in_frame(&kernel, rows, records);
     }
+    in_parts(rows, records, count, &|rows, records| in_frame(&kernel, rows, records));
+}
+
+/// Runs a kernel on `count` parts of a color, in several threads. Compiled once per lane width, not per kernel.
+#[inline(never)]
+fn in_parts<L: Lanes>(
+    rows: SharedRows<'_>,
+    records: SegmentRecords<'_, L>,
+    count: usize,
+    kernel: &(dyn Fn(SharedRows<'_>, SegmentRecords<'_, L>) + Sync),
+) {
     // SAFETY: `check_disjoint`: no two lanes of the segment push the same row, apart from the inert one, and that one is
     // in the lanes at the end of the last batch, so in one part. Rows that are not pushed are not written.
-    unsafe { rows.share(records.into_parts(count), |rows, records| in_frame(&kernel, rows, records)) };
+    unsafe { rows.share(records.into_parts(count), kernel) };
 }
 
 /// One instance of a kernel, for parts and for whole segments.
