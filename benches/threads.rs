@@ -1,11 +1,13 @@
-//! Whole runs with one thread and with more, stepped alternately, so that a slow spell of the machine meets both.
+//! Whole runs without groups of islands, with them, and with more threads, stepped alternately, so that a slow spell of the
+//! machine meets all of them.
 //!
 //! ```sh
 //! cargo bench --bench threads                                   # two threads, the scenes below
 //! cargo bench --bench threads -- 4 large_pyramid shim           # threads, scenes, solvers
+//! cargo bench --bench threads -- 2 many_pyramids:32 groups=1024 # contacts in a group
 //! ```
 //!
-//! The bits of both runs must be the same at the end.
+//! The bits of all runs must be the same at the end.
 
 use simpulse::engine::solvers::{self, Variant};
 use simpulse::engine::world::{Settings, World};
@@ -21,10 +23,13 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let is_test = arguments.iter().any(|a| a == "--test");
     let mut threads = 2;
+    let mut group_size = Settings::default().group_size;
     let (mut names, mut variants) = (vec![], vec![]);
     for argument in arguments.iter().filter(|a| !a.starts_with("--")) {
         if let Ok(number) = argument.parse() {
             threads = number;
+        } else if let Some(Ok(size)) = argument.strip_prefix("groups=").map(str::parse) {
+            group_size = size;
         } else if let Ok(variant) = solvers::find(argument) {
             variants.push(variant);
         } else {
@@ -38,20 +43,22 @@ fn main() {
         variants
             .extend(["soft_step", "shim"].map(|name| solvers::find(name).expect("a solver of the crate")));
     }
-    println!("mean and longest step with 1 and with {threads} threads, of {STEPS} steps");
+    println!("mean step as a whole, in groups, and in groups with {threads} threads, of {STEPS} steps");
     for name in names {
         for &variant in &variants {
-            compare(name, variant, threads, if is_test { 10 } else { STEPS });
+            compare(name, variant, [threads, group_size], if is_test { 10 } else { STEPS });
         }
     }
 }
 
 /// Times a scene under a solver.
-fn compare(name: &str, variant: &'static Variant, threads: usize, steps: u32) {
+fn compare(name: &str, variant: &'static Variant, [threads, group_size]: [usize; 2], steps: u32) {
     let scene = scenes::load(name).expect("a scene of the catalog").scene;
-    let world = |threads| scene.build(Settings { threads, ..Settings::new(variant) }).expect("a valid scene");
-    let mut worlds: [World; 2] = [world(1), world(threads)];
-    let (mut sums, mut longest) = ([Duration::ZERO; 2], [Duration::ZERO; 2]);
+    let world = |threads, group_size| {
+        scene.build(Settings { threads, group_size, ..Settings::new(variant) }).expect("a valid scene")
+    };
+    let mut worlds: [World; 3] = [world(1, 0), world(1, group_size), world(threads, group_size)];
+    let (mut sums, mut longest) = ([Duration::ZERO; 3], [Duration::ZERO; 3]);
     for first in (0..steps).step_by(TURN as usize) {
         for (i, world) in worlds.iter_mut().enumerate() {
             for _ in first..(first + TURN).min(steps) {
@@ -62,8 +69,12 @@ fn compare(name: &str, variant: &'static Variant, threads: usize, steps: u32) {
             }
         }
     }
-    assert_eq!(worlds[0].state_hash(), worlds[1].state_hash(), "{name} under {}", variant.name);
-    let [one, more] = sums.map(|sum| sum / steps);
-    let ratio = one.as_secs_f64() / more.as_secs_f64();
-    println!("{name} {}: {one:.2?} and {more:.2?}, {ratio:.2} times; {longest:.2?}", variant.name);
+    let hashes = worlds.each_ref().map(World::state_hash);
+    assert!(hashes.iter().all(|&hash| hash == hashes[0]), "{name} under {}", variant.name);
+    let [whole, one, more] = sums.map(|sum| sum / steps);
+    let [groups, gain] = [(whole, one), (one, more)].map(|(a, b)| a.as_secs_f64() / b.as_secs_f64());
+    println!(
+        "{name} {}: {whole:.2?}, {one:.2?} ({groups:.2} times), {more:.2?} ({gain:.2} times); longest {longest:.2?}",
+        variant.name
+    );
 }

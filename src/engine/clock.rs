@@ -129,6 +129,27 @@ impl Clock {
         self.timings.laps[phase as usize] += 1;
     }
 
+    /// Divides the time since the last lap among phases as `parts` have taken it, which ran one after the other or at the same
+    /// time.
+    pub fn divide<'t>(&mut self, parts: impl Iterator<Item = &'t Timings>) {
+        let mut sum = Timings::default();
+        for part in parts {
+            (0..Phase::ALL.len()).for_each(|i| {
+                sum.phase_ns[i] += part.phase_ns[i];
+                sum.laps[i] = sum.laps[i].max(part.laps[i]);
+            });
+        }
+        let all = sum.phase_ns.iter().sum::<u64>().max(1) as f64;
+        let elapsed = self.start.as_mut().map_or(0.0, |(_, last)| {
+            let now = Instant::now();
+            (now - std::mem::replace(last, now)).as_nanos() as f64
+        });
+        for (i, (ns, laps)) in sum.phase_ns.into_iter().zip(sum.laps).enumerate() {
+            self.timings.phase_ns[i] += (elapsed * ns as f64 / all) as u64;
+            self.timings.laps[i] += laps;
+        }
+    }
+
     /// Ends the step.
     pub fn stop(mut self) -> Timings {
         if let Some((begin, _)) = self.start {

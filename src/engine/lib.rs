@@ -21,6 +21,8 @@
 #![doc = include_str!("README.md")]
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
+pub use world::batch;
+
 pub mod bodies;
 pub mod broadphase;
 pub mod clock;

@@ -365,6 +365,7 @@ fn a_step_says_what_is_wrong_before_it_begins() {
         without: Without::default(),
         record_impulses: true,
         points: 0,
+        has_discs: false,
     };
     let new = |lanes: Batches, serial: Batches, contacts: usize| {
         let mut work = Workspace { rows: rows(), lanes, serial, ..Workspace::default() };

@@ -2,6 +2,7 @@
 
 mod ablation;
 mod agree;
+mod batch;
 mod broadphase;
 mod common;
 mod contacts;

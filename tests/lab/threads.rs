@@ -1,9 +1,12 @@
-//! Law: the bits of a step do not depend on the number of threads that share it.
+//! Law: the bits of a step do not depend on the number of threads that share it, nor on the groups of islands.
 
-use crate::common::{scene, with_width};
+use crate::common::{on_ground, scene, with_width};
+use bytemuck::bytes_of;
+use simpulse::engine::bodies::BodyKind;
 use simpulse::engine::lanes::LaneWidth;
 use simpulse::engine::solvers::VARIANTS;
 use simpulse::engine::world::Settings;
+use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 
 /// Scenes whose colors threads divide, with the number of steps: boxes at rest, bodies of several shapes that fall, joints.
 const SCENES: [(&str, usize); 3] = [("pyramid:70", 3), ("compounds", 8), ("joint_grid:80", 3)];
@@ -33,6 +36,57 @@ fn every_number_of_threads_gives_the_same_bits() {
             let alone = run(1, LaneWidth::W8);
             for (threads, width) in [(2, LaneWidth::W8), (3, LaneWidth::W4), (8, LaneWidth::WIDEST)] {
                 assert!(run(threads, width) == alone, "{name} under {}, {threads} threads", variant.name);
+            }
+        }
+    }
+}
+
+/// Islands of all kinds, with the number of steps: pyramids, so many that threads share them; boxes that fall on kinematic
+/// boxes and each other, and discs that bounce.
+const ISLANDS: [(&str, usize); 3] = [("many_pyramids:9", 3), ("boxes", 90), ("discs", 90)];
+
+/// A scene of [`ISLANDS`].
+fn islands(name: &str) -> Scene {
+    let lattice = (0..96).map(|i| (i, f64::from(i % 12) * 3.0, f64::from(i / 12) * 2.5));
+    let cube = || SceneShape::rectangle(0.5, 0.5);
+    let disc = || SceneShape { restitution: 0.7, ..SceneShape::disc(0.5) };
+    match name {
+        "boxes" => {
+            let falls = lattice.clone().map(|(_, x, y)| SceneBody::dynamic([x + 0.1 * y, 3.0 + y], cube()));
+            let lifts = lattice.filter(|(i, ..)| i % 5 == 0).map(|(_, x, y)| {
+                SceneBody::new(BodyKind::Kinematic, [x, 0.2 + y], cube()).moving([0.0, 0.3], 0.1)
+            });
+            on_ground(falls.chain(lifts).collect())
+        }
+        "discs" => {
+            on_ground(lattice.map(|(_, x, y)| SceneBody::dynamic([x + 0.15 * y, 1.5 + y], disc())).collect())
+        }
+        _ => scene(name),
+    }
+}
+
+#[test]
+fn every_division_into_groups_gives_the_same_bits() {
+    for (name, steps) in ISLANDS {
+        let (scene, most) = (islands(name), if name == "many_pyramids:9" { 300 } else { 4 });
+        for variant in VARIANTS.iter().filter(|variant| variant.is_local) {
+            let run = |group_size: usize, threads: usize| {
+                let settings =
+                    Settings { threads, group_size, record_impulses: true, ..Settings::new(variant) };
+                let mut world = scene.build(settings).unwrap();
+                let mut most_groups = 0;
+                for _ in 0..steps {
+                    world.step().unwrap();
+                    most_groups = most_groups.max(world.counts.groups);
+                }
+                assert_eq!(most_groups > 0, group_size > 0, "{name} under {}", variant.name);
+                let contacts: Vec<Vec<u8>> = world.contacts.iter().map(|c| bytes_of(c).to_vec()).collect();
+                (world.state_hash(), contacts, world.counts.sweeps)
+            };
+            let whole = run(0, 1);
+            for (group_size, threads) in [(1, 1), (2, 3), (most, 1), (most, 2)] {
+                let found = run(group_size, threads);
+                assert!(found == whole, "{name} under {}, groups of {group_size}", variant.name);
             }
         }
     }

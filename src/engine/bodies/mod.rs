@@ -4,6 +4,7 @@
 use crate::lanes::LaneVec;
 use crate::shapes::{MassProperties, Pose};
 use glam::Vec2;
+use std::ops::Range;
 
 pub(crate) mod def;
 
@@ -131,6 +132,13 @@ impl Bodies {
         let i = self.len() - 1;
         self.set(i, def, mass);
         i
+    }
+
+    /// Gives some bodies the state that they have in `from`.
+    pub(crate) fn restore(&mut self, from: &mut Bodies, bodies: Range<usize>) {
+        for (array, from) in self.arrays_mut().into_iter().zip(from.arrays_mut()) {
+            array[bodies.clone()].copy_from_slice(&from[bodies.clone()]);
+        }
     }
 
     /// Replaces body `i`.

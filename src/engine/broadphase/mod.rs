@@ -11,11 +11,13 @@ mod hash_grid;
 mod node;
 mod region;
 mod sort;
+mod spaces;
 mod tree;
 
 pub use bounds::FatBoxes;
 pub use hash_grid::HashGrid;
 pub use region::Region;
+pub use spaces::Spaces;
 pub use tree::Tree;
 
 use crate::shapes::Aabb;
@@ -82,6 +84,8 @@ pub enum BroadPhase {
     HashGrid(HashGrid),
     /// See [`Tree`].
     Tree(Tree),
+    /// See [`Spaces`].
+    Spaces(Spaces),
 }
 
 impl BroadPhase {
@@ -102,6 +106,7 @@ impl BroadPhase {
         match self {
             BroadPhase::HashGrid(grid) => grid.pairs(proxies, out),
             BroadPhase::Tree(tree) => tree.pairs(proxies, out, workers),
+            BroadPhase::Spaces(spaces) => spaces.pairs(proxies, out),
         }
     }
 
@@ -110,7 +115,16 @@ impl BroadPhase {
     pub fn update(&mut self, proxies: &[Proxy], moved: &[u32], pairs: &mut Vec<[u32; 2]>, workers: &Workers) {
         match self {
             BroadPhase::Tree(tree) => tree.update(proxies, moved, pairs, workers),
+            BroadPhase::Spaces(spaces) => spaces.update(proxies, moved, pairs),
             _ => self.pairs(proxies, pairs, workers),
+        }
+    }
+
+    /// Shapes that `shape` may meet: those of its space, or all.
+    pub(crate) fn around(&self, shape: u32) -> std::ops::Range<u32> {
+        match self {
+            BroadPhase::Spaces(spaces) => spaces.around(shape),
+            _ => 0..u32::MAX,
         }
     }
 }

@@ -52,9 +52,9 @@ pub struct Continuous {
     parts: Vec<f32>,
 }
 
-/// Calls back with the proxies whose bounds overlap a box.
+/// Calls back with the proxies whose bounds overlap a box, and that a shape may meet.
 #[doc(hidden)]
-pub type Near<'w> = dyn Fn(Aabb, &mut dyn FnMut(u32)) + 'w;
+pub type Near<'w> = dyn Fn(u32, Aabb, &mut dyn FnMut(u32)) + 'w;
 
 /// Calls back with the two bodies of every joint that has rigid rows.
 #[doc(hidden)]
@@ -76,6 +76,7 @@ pub struct Moving<'w> {
     pub slop: f32,
     /// Returns whether collisions between two shapes are disabled.
     pub apart: &'w dyn Fn([u32; 2]) -> bool,
+    /// Visits shapes near an area that a shape may meet.
     pub near: &'w Near<'w>,
     pub joined: &'w EachJoined<'w>,
 }
@@ -166,7 +167,7 @@ impl Continuous {
                     part = part.min(pair(moving, rows, [other, shape], part));
                 }
             };
-            (moving.near)(swept, &mut |other| {
+            (moving.near)(shape, swept, &mut |other| {
                 let proxy = &moving.proxies[other as usize];
                 if moving.bodies.kind[proxy.body as usize] == BodyKind::Static {
                     meet(other, proxy);

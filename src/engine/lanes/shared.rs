@@ -74,6 +74,17 @@ impl<'a, T: Pod + Send> Shared<'a, T> {
         unsafe { *self.first.add(i) }
     }
 
+    /// Replaces a record.
+    ///
+    /// # Panics
+    /// If there is no such record.
+    #[inline(always)]
+    pub(crate) fn set(self, i: usize, record: T) {
+        assert!(i < self.len, "record {i} of {}", self.len);
+        // SAFETY: it exists; no other thread accesses it (`share`).
+        unsafe { *self.first.add(i) = record };
+    }
+
     /// Fetches the first quad of a record into the cache, and its second cache line if it has two.
     #[inline(always)]
     pub(crate) fn prefetch(self, i: u32) {

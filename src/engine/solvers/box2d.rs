@@ -33,6 +33,7 @@ pub static SOLVER: Variant = Variant {
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
     impacts: ImpactLaw::BOX2D,
     frozen: Some(FreezeLimits::BOX2D),
+    is_local: true,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

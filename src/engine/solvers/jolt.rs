@@ -62,6 +62,7 @@ pub static SOLVER: Variant = Variant {
         (Guarantee::Converges, "one friction row a contact, which is another law"),
         (Guarantee::Rest, "10 sweeps are too few for tall stacks and large mass ratios"),
     ],
+    is_local: true,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -207,6 +207,9 @@ pub struct Variant {
     pub frozen: Option<FreezeLimits>,
     /// Default of [continuous collision](crate::continuous).
     pub continuous: bool,
+    /// Whether islands do not see each other, and nothing but impulses is kept from step to step: groups of islands may be
+    /// solved apart.
+    pub is_local: bool,
     /// Numbers kept from step to step, in addition to impulses.
     pub kept: StateSize,
     /// Why it does not support joints, if it does not.
@@ -249,6 +252,7 @@ impl Variant {
         impacts: ImpactLaw::Bias,
         frozen: None,
         continuous: false,
+        is_local: false,
         kept: StateSize::NONE,
         joints_unsupported: None,
         exceptions: &[],

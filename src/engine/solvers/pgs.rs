@@ -44,6 +44,7 @@ pub static SOLVER: Variant = Variant {
     budget: Budget { substeps: 1, velocity_iterations: 8, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
     exceptions: &[(Guarantee::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
+    is_local: true,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

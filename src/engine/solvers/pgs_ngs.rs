@@ -30,6 +30,7 @@ pub static SOLVER: Variant = Variant {
     uses: Uses { velocity: true, relax: false, position: true },
     parameters: &[Parameter::CORRECTION],
     exceptions: &[(Guarantee::Rest, "4 sweeps are too few for stacks")],
+    is_local: true,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

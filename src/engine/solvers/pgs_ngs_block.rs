@@ -33,6 +33,7 @@ pub static SOLVER: Variant = Variant {
         (Guarantee::Cone, "friction rows come first, bounded by the normal impulses before the sweep"),
         (Guarantee::Rest, "4 sweeps are too few for stacks"),
     ],
+    is_local: true,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

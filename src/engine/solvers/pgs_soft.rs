@@ -32,6 +32,7 @@ pub static SOLVER: Variant = Variant {
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION_OF_STEP, h)),
     exceptions: &[(Guarantee::Rest, "6 sweeps without substeps are too few for stacks")],
     impacts: ImpactLaw::BOX2D,
+    is_local: true,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

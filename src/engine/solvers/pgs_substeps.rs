@@ -30,6 +30,7 @@ pub static SOLVER: Variant = Variant {
     summary: "rigid sequential impulses in substeps",
     budget: Budget { substeps: 8, velocity_iterations: 2, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
+    is_local: true,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

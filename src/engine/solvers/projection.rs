@@ -30,6 +30,7 @@ pub static SOLVER: Variant = Variant {
     uses: Uses { velocity: true, relax: false, position: true },
     exceptions: &[(Guarantee::Rest, "no friction and no warm starting")],
     impacts: ImpactLaw::None,
+    is_local: true,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -80,6 +80,7 @@ pub static SOLVER: Variant = Variant {
     impacts: ImpactLaw::Solver { per_contact: 0, per_point: 0 },
     frozen: Some(FreezeLimits::LOADED),
     continuous: true,
+    is_local: true,
     make: Variant::made_by(|| Box::new(Shim::default())),
     ..Variant::BASE
 };
@@ -118,8 +119,6 @@ const MECHANISMS: [Mechanism; 5] = [
 struct Shim {
     jams: Jams,
     chains: Chains,
-    /// Whether a candidate pair has a disc.
-    rolls: bool,
 }
 
 /// Visit limit for each of the first points of an island that is hit. With fewer substeps than the standard it is lower, so
@@ -137,7 +136,7 @@ impl Solver for Shim {
     }
 
     fn after_collision(&mut self, scene: &mut CollisionScene<'_>) {
-        self.rolls = scene.has_discs;
+        scene.speed_limits.clear();
         if scene.without.leaves_out(part::JAMS) {
             self.jams.clear();
         } else {
@@ -150,7 +149,7 @@ impl Solver for Shim {
         let frequencies = angular_frequencies(f32::INFINITY, stiffness, passes.h());
         let springs = Soft::new(frequencies, damping_ratio, push_speed, passes.h());
         let (soft, rigid) = (Bearing { springs, from: push_speed }, Rigid::new(passes.h()));
-        if self.rolls && passes.has(part::FRAMES) {
+        if passes.has_discs() && passes.has(part::FRAMES) {
             let (dt, n) = (passes.dt(), passes.budget().substeps as f32);
             let middle = 0.5 * (1.0 - 1.0 / n) * dt;
             passes.run(Phase::Prepare, &mut Roll { middle, dt, steady: STEADY * passes.length_unit() });
@@ -160,7 +159,7 @@ impl Solver for Shim {
             passes.spread_impacts(ImpactWaves { timed, stops: true, visits });
             passes.parts().clock.lap(Phase::Prepare);
         }
-        let Shim { jams, chains, .. } = self;
+        let chains = &mut self.chains;
         if passes.has(part::CHAINS) {
             passes.find_chains(chains);
         } else {
@@ -181,14 +180,14 @@ impl Solver for Shim {
                 passes.iteration_done();
             }
             passes.solve_chains(chains, ChainStage::Again);
-            jams.bound(passes);
+            passes.limit_speeds();
             passes.integrate_positions();
             for _ in 0..budget.relax_iterations {
                 passes.block_sweep_normal_first(Phase::Relax, rigid);
             }
             passes.solve_chains(chains, ChainStage::Relax);
             passes.keep_chains(chains, substep + 1 == budget.substeps);
-            jams.bound(passes);
+            passes.limit_speeds();
             passes.end_substep(substep);
         }
         passes.leave_chains(chains);

@@ -35,6 +35,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[Parameter::CONTACT_HERTZ, Parameter::DAMPING_RATIO, Parameter::PUSH_SPEED],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
     impacts: ImpactLaw::BOX2D,
+    is_local: true,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

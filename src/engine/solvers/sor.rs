@@ -38,6 +38,7 @@ pub static SOLVER: Variant = Variant {
         },
     ],
     exceptions: &[(Guarantee::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
+    is_local: true,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -35,6 +35,7 @@ pub static SOLVER: Variant = Variant {
         ..Parameter::CORRECTION
     }],
     exceptions: &[(Guarantee::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
+    is_local: true,
     make: Variant::made_by(|| Box::new(SplitImpulse::default())),
     ..Variant::BASE
 };

@@ -30,6 +30,7 @@ pub static SOLVER: Variant = Variant {
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
     exceptions: &[(Guarantee::Rest, "8 sweeps in 4 pairs are too few for tall stacks and large mass ratios")],
+    is_local: true,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

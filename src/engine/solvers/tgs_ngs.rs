@@ -31,6 +31,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[Parameter::CORRECTION],
     exceptions: &[(Guarantee::Rest, "jitters at its standard budget")],
     impacts: ImpactLaw::BOX2D,
+    is_local: true,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -54,6 +54,7 @@ pub static SOLVER: Variant = Variant {
         (Guarantee::Rest, "no warm start"),
     ],
     impacts: ImpactLaw::Solver { per_contact: 0, per_point: 2 },
+    is_local: true,
     make: Variant::made_by(|| Box::new(Xpbd::default())),
     ..Variant::BASE
 };

@@ -12,7 +12,7 @@ use crate::narrowphase::candidate::Candidate;
 use crate::narrowphase::circles::Rolling;
 use crate::narrowphase::frozen::Found;
 use crate::narrowphase::lanes::PoseRow;
-use glam::Vec2;
+use std::ops::Range;
 
 /// State of the narrow phase between steps.
 #[derive(Clone, Default)]
@@ -188,16 +188,15 @@ impl World {
 
     /// Calls a collision hook of the solver.
     fn with_scene(&mut self, hook: impl FnOnce(&mut dyn Solver, &mut CollisionScene<'_>)) {
-        let narrow = &self.narrow;
-        let mut of_kind = PairKind::ALL.into_iter().zip(&narrow.of_kind);
         let mut scene = CollisionScene {
             bodies: &self.bodies,
             contacts: &mut self.contacts,
             types: &self.work.types,
-            has_discs: of_kind.any(|(kind, pairs)| kind.has_disc() && !pairs.is_empty()),
+            speed_limits: &mut self.work.speed_limits,
             parameters: self.settings.scaled_parameters(),
             without: self.settings.without,
-            gravity: Vec2::from(self.settings.gravity),
+            gravity: self.settings.gravity,
+            gravities: &self.gravities,
             dt: self.settings.dt,
             length_unit: self.settings.length_unit,
         };
@@ -209,6 +208,23 @@ impl Narrow {
     /// Poses of all bodies at the collision phase of this step.
     pub fn poses(&self) -> &[PoseRow] {
         &self.poses
+    }
+
+    /// Forgets the contacts of pairs of shapes within a range, which meet no others.
+    pub fn forget(&mut self, shapes: Range<u32>) {
+        let first = |candidate: &Candidate| candidate.shapes[0].min(candidate.shapes[1]);
+        let from = self.candidates.partition_point(|candidate| first(candidate) < shapes.start);
+        for candidate in
+            self.candidates[from..].iter_mut().take_while(|candidate| first(candidate) < shapes.end)
+        {
+            candidate.contact = NO_CONTACT;
+        }
+        (self.is_changed, self.jobs_are_current) = (true, false);
+    }
+
+    /// Whether a pair of shapes that may touch has a disc.
+    pub fn has_discs(&self) -> bool {
+        PairKind::ALL.into_iter().zip(&self.of_kind).any(|(kind, pairs)| kind.has_disc() && !pairs.is_empty())
     }
 
     /// Links candidates to their contacts in a list that replaced the last one. Both are sorted by shape

@@ -22,6 +22,9 @@ pub struct StepCounts {
     pub colors: usize,
     /// Contacts solved serially because colors ran out.
     pub overflow: usize,
+    /// Groups of islands that were solved one by one; 0 if the world was solved as a whole, see
+    /// [`Settings::group_size`](super::Settings::group_size).
+    pub groups: usize,
     /// Lanes in all batches; occupancy is `contacts / lane_slots`.
     pub lane_slots: usize,
     /// Bodies that moved farther than half their width; counted only with continuous collision.

@@ -10,6 +10,7 @@ use crate::shapes::{Aabb, MassProperties, Shape};
 use glam::{DVec2, Vec2};
 use std::f64::consts::TAU;
 use std::hash::{BuildHasher, RandomState};
+use std::ops::Range;
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -411,6 +412,23 @@ impl World {
         b.force_y[i] += force[1] as f32;
         b.torque[i] += torque as f32;
         Ok(())
+    }
+
+    /// After bodies with these indices were put back to their start: forgets their contacts, what the solver keeps of them, and
+    /// forces for the next step; restarts their joints.
+    pub(super) fn restart(&mut self, bodies: Range<usize>, joints: Range<u32>) {
+        let shapes =
+            |i: usize| self.slots.first_shape.get(i).map_or(self.shapes.len() as u32, |&first| first);
+        let shapes = shapes(bodies.start)..shapes(bodies.end);
+        for i in bodies.clone() {
+            self.fat_boxes.forget(i);
+            self.work.kept.forget_body(i);
+        }
+        self.applied.retain(|standing| !bodies.contains(&(standing.body as usize)));
+        self.targets.retain(|target| !bodies.contains(&(target.body as usize)));
+        self.work.kept.forget_shapes(shapes.clone());
+        self.narrow.forget(shapes);
+        self.restart_joints(joints);
     }
 
     /// After a step: restores persistent forces, ends moves of kinematic bodies and frees the indices of removed bodies.

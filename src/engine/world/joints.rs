@@ -12,6 +12,7 @@ use crate::lanes::BodyRow;
 use crate::narrowphase::lanes::PoseRow;
 use std::any::Any;
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 /// A block of rows of a joint after a step.
 #[derive(Clone, Copy, Debug)]
@@ -308,6 +309,15 @@ impl World {
         {
             self.joints.remove(joint as usize);
             self.joints_changed();
+        }
+    }
+
+    /// Forgets what joints with these indices keep from step to step.
+    pub(super) fn restart_joints(&mut self, joints: Range<u32>) {
+        for index in joints {
+            if let Some([group, i]) = self.joints.places[index as usize] {
+                self.work.types[group as usize].kind.restart(i as usize);
+            }
         }
     }
 

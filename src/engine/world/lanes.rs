@@ -1,7 +1,6 @@
 //! Assignment of contacts to lanes.
 
 use super::{Order, World};
-use crate::bodies::BodyKind;
 use crate::constraints::step::assign::Sides;
 use crate::constraints::{Features, PartnerKind};
 
@@ -10,17 +9,20 @@ impl World {
     /// same.
     pub(super) fn assign_lanes(&mut self, features: &Features) {
         let widths = self.settings.widths();
-        let choice = Some((self.solver_is.name, widths, self.settings.order, *features));
-        if !self.narrow.is_changed && self.lanes_are_for == choice {
+        let group_size = self.group_size();
+        let choice = Some((self.solver_is.name, widths, self.settings.order, *features, group_size));
+        let is_new = self.lanes_are_for != choice;
+        if !self.narrow.is_changed && !is_new {
             return;
         }
         (self.narrow.is_changed, self.lanes_are_for) = (false, choice);
+        if group_size > 0 && self.group_islands(features, is_new) {
+            return;
+        }
+        self.groups.leave();
+        self.counts.groups = 0;
         let kinds = &self.bodies.kind;
-        let partner = |body: u32| match kinds[body as usize] {
-            BodyKind::Dynamic => PartnerKind::Dynamic,
-            BodyKind::Kinematic => PartnerKind::Kinematic,
-            BodyKind::Static => PartnerKind::Static,
-        };
+        let partner = |body: u32| PartnerKind::of(kinds[body as usize]);
         let (work, contacts) = (&mut self.work, &self.contacts);
         let levels = self.solver.levels(&self.bodies, contacts);
         let sides = Sides { bodies: kinds.len(), partner, levels };
@@ -45,8 +47,8 @@ impl World {
         }
     }
 
-    /// Color of each contact of the last step, numbered in solving order; contacts of a color are solved at the same
-    /// time. `None` for contacts that are solved one by one.
+    /// Color of each contact of the last step, numbered in the solving order of its island; contacts of a color are solved
+    /// at the same time. `None` for contacts that are solved one by one.
     ///
     /// ```
     /// use simpulse_engine::prelude::*;
@@ -63,6 +65,7 @@ impl World {
     /// ```
     pub fn contact_colors(&self) -> Vec<Option<u16>> {
         match self.settings.order {
+            Order::Colored if self.groups.are_in_use() => self.groups.contact_colors(self.contacts.len()),
             Order::Colored => self.assignment.contact_colors(self.contacts.len()),
             _ => vec![None; self.contacts.len()],
         }

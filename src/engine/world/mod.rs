@@ -24,16 +24,20 @@ use candidates::ignores;
 use collide::Narrow;
 use edit::{Slots, StandingForces, Target};
 use events::Events;
+use groups::Groups;
 use joints::JointSlots;
 use std::fmt;
+use std::ops::Range;
 use traits::Traits;
 
+pub mod batch;
 mod body;
 mod candidates;
 mod collide;
 mod counts;
 mod edit;
 mod events;
+mod groups;
 mod joints;
 mod lanes;
 mod pairs;
@@ -130,13 +134,16 @@ pub struct World {
     /// Whether static bodies came, went or were moved since `seams` were found.
     seams_are_stale: bool,
     assignment: Assignment,
+    groups: Groups,
+    /// Whether the coming step is solved as a whole, to be looked at.
+    is_watched: bool,
     /// Scratch memory of [`Batches::check_disjoint`](crate::constraints::records::batches::Batches::check_disjoint).
     seen_rows: Vec<u32>,
     continuous: Continuous,
     /// Whether bodies were added or removed since `continuous` was built.
     continuous_is_stale: bool,
-    /// Solver, widths, order and features that the current lanes were assigned for.
-    lanes_are_for: Option<(&'static str, [LaneWidth; 2], Order, Features)>,
+    /// Solver, widths, order, features and size of groups that the current lanes were assigned for.
+    lanes_are_for: Option<(&'static str, [LaneWidth; 2], Order, Features, usize)>,
     /// Length of the substep that the impulses of `contacts` belong to (s); `None` before the first step.
     impulses_of: Option<f32>,
     /// The active solver, and the variant that created it.
@@ -146,6 +153,8 @@ pub struct World {
     slots: Slots,
     /// Persistent forces to restore before the next step.
     applied: Vec<StandingForces>,
+    /// Gravity of each body (m/s²); empty if it is that of the settings. `[bodies]`
+    gravities: Vec<[f32; 2]>,
     /// Poses of kinematic bodies after the next step.
     targets: Vec<Target>,
     events: Events,
@@ -196,6 +205,8 @@ impl World {
             seams: Seams::default(),
             seams_are_stale: true,
             assignment: Assignment::default(),
+            groups: Groups::default(),
+            is_watched: false,
             seen_rows: Vec::new(),
             continuous: Continuous::default(),
             continuous_is_stale: true,
@@ -206,6 +217,7 @@ impl World {
             work: Workspace::default(),
             slots: Slots::new(),
             applied: Vec::new(),
+            gravities: Vec::new(),
             targets: Vec::new(),
             events: Events::default(),
             joints: JointSlots::default(),
@@ -267,6 +279,7 @@ impl World {
                 settings,
                 ..
             } = self;
+            let broadphase = &*broadphase;
             if std::mem::take(&mut self.continuous_is_stale) {
                 let lives = slots.lives.iter().zip(&slots.first_shape).zip(&slots.shapes);
                 let each = lives.zip(&bodies.kind).map(|(((&lives, &first), &count), &kind)| {
@@ -281,9 +294,13 @@ impl World {
                 proxies,
                 contacts,
                 slop: Margins::of(settings.length_unit).slop,
-                apart: &|pair| ignores(joints, filters, pair, pair.map(|i| shape_body[i as usize])),
-                near: &|area, visit| {
-                    broadphase.visit(proxies, &mut Region::area(area), |_, shape| visit(shape));
+                apart: &|pair| {
+                    ignores(joints, filters, pair, pair.map(|i| shape_body[i as usize]))
+                        || !broadphase.around(pair[0]).contains(&pair[1])
+                },
+                near: &|shape, area, visit| match broadphase {
+                    BroadPhase::Spaces(spaces) => spaces.around(shape).for_each(visit),
+                    _ => broadphase.visit(proxies, &mut Region::area(area), |_, shape| visit(shape)),
                 },
                 joined: &|visit| {
                     let rigid = types.iter().filter(|joined| joined.kind.rigid_size() > 0);
@@ -301,8 +318,10 @@ impl World {
     pub fn frozen_step(&mut self) {
         let mut clock = Clock::start(self.settings.timed);
         self.pairs_are_stale = true;
+        self.is_watched = true;
         self.set_workers();
         self.solve(&mut clock);
+        self.is_watched = false;
         self.timings = clock.stop();
     }
 
@@ -350,7 +369,8 @@ impl World {
         }
         clock.lap(Phase::Collide);
         self.assign_lanes(&self.kernel_features());
-        if self.work.workers.count() > 1 && !self.work.lanes.is_checked() {
+        let is_whole = !self.groups.are_in_use();
+        if is_whole && self.work.workers.count() > 1 && !self.work.lanes.is_checked() {
             self.work.lanes.check_disjoint(self.bodies.len() as u32, &mut self.seen_rows);
         }
         clock.lap(Phase::Color);
@@ -366,6 +386,7 @@ impl World {
         let (features, s) = (self.kernel_features(), &self.settings);
         let motion = MotionInput {
             gravity: s.gravity,
+            gravities: &self.gravities,
             h: s.h(),
             features: Features { damping: features.damping, ..self.features },
             integrator: s.integrator,
@@ -384,7 +405,7 @@ impl World {
 
     /// Runs the solver's stages on the prepared rows and lanes.
     fn run_solver(&mut self, clock: &mut Clock) -> WorkCount {
-        let (s, width) = (&self.settings, self.lane_width());
+        let s = &self.settings;
         let input = StepInput {
             features: self.kernel_features(),
             budget: s.budget,
@@ -395,14 +416,31 @@ impl World {
             record_impulses: s.record_impulses || s.contact_events,
             impacts: s.impact_law(),
             points: self.counts.points,
+            has_discs: self.narrow.has_discs(),
         };
         (self.work.observe, self.work.last_rule) = (s.observe_rule, None);
+        if self.groups.are_in_use() {
+            return self.solve_groups(clock, &input);
+        }
+        let width = self.lane_width();
         solvers::run(self.solver.as_mut(), &mut self.work, &mut self.contacts, clock, &input, width)
+    }
+
+    /// Number of contacts in a group of islands; 0 if islands are not solved in groups.
+    ///
+    /// Groups are for solvers whose islands do not see each other, and for contacts alone. What looks at the problem of the
+    /// whole world gets it.
+    fn group_size(&self) -> usize {
+        let s = &self.settings;
+        let is_watched = self.is_watched || s.observe_rule || self.work.watch.is_some();
+        let may = self.solver_is.is_local && s.order == Order::Colored && self.work.types.is_empty();
+        if may && !is_watched { s.group_size } else { 0 }
     }
 
     /// Number of lanes per instruction in the last step: as many as the settings allow and the colors fill.
     pub fn lane_width(&self) -> LaneWidth {
-        LaneWidth::from_lanes(self.work.lanes.width()).unwrap_or(LaneWidth::W1)
+        let width = if self.groups.are_in_use() { self.groups.width() } else { self.work.lanes.width() };
+        LaneWidth::from_lanes(width).unwrap_or(LaneWidth::W1)
     }
 
     /// Features of the scene and the extra ones, completed to a set that has a kernel: friction and second points
@@ -414,32 +452,43 @@ impl World {
         features
     }
 
-    /// Returns the first diverged body as an error, if there is one.
-    fn check(&self) -> Result<(), Divergence> {
+    /// Whether a body is faster than any that has not diverged, or not a number.
+    fn is_out_of_bounds(&self, body: usize) -> bool {
+        self.out_of_bounds()(body)
+    }
+
+    fn out_of_bounds(&self) -> impl Fn(usize) -> bool {
         let b = &self.bodies;
-        // Slices of one length and no branches, so that the compiler vectorizes the loop.
+        // Slices of one length and no branches, so that the compiler vectorizes a loop over it.
         let arrays = [&b.velocity_x, &b.velocity_y, &b.angular_velocity, &b.position_x, &b.position_y];
         let [vx, vy, w, x, y] = arrays.map(|array| &array[..b.len()]);
         let [cos, sin] = [&b.rotation_cos, &b.rotation_sin].map(|array| &array[..b.len()]);
         let fastest = DIVERGED_SPEED * self.settings.length_unit;
-        let bad = |i: usize| {
+        move |i| {
             // NaN is bad, too. A spin that was out of bounds only within the step leaves a NaN in the
             // rotation.
             !((vx[i] * vx[i] + vy[i] * vy[i] <= fastest * fastest)
                 & (w[i].abs() <= DIVERGED_SPEED)
                 & ((x[i] + y[i]).abs() < f32::INFINITY)
                 & ((cos[i] + sin[i]).abs() < f32::INFINITY))
-        };
+        }
+    }
+
+    /// Returns the first diverged body as an error, if there is one.
+    fn check(&self) -> Result<(), Divergence> {
+        let fastest = DIVERGED_SPEED * self.settings.length_unit;
+        let b = &self.bodies;
+        let bad = self.out_of_bounds();
         if !(0..b.len()).fold(false, |any, i| any | bad(i)) {
             return Ok(());
         }
         let body = (0..b.len()).find(|&i| bad(i)).unwrap_or(0);
-        let (speed, spin) = (b.velocity(body).length(), w[body].abs());
+        let (speed, spin) = (b.velocity(body).length(), b.angular_velocity[body].abs());
         let (quantity, speed) = if !(0.0..=fastest).contains(&speed) {
             (Quantity::Speed, speed)
         } else if !(0.0..=DIVERGED_SPEED).contains(&spin) {
             (Quantity::Spin, spin)
-        } else if !(x[body] + y[body]).is_finite() {
+        } else if !(b.position_x[body] + b.position_y[body]).is_finite() {
             (Quantity::Position, f32::NAN)
         } else {
             (Quantity::Angle, f32::NAN)
@@ -449,6 +498,11 @@ impl World {
 
     /// Hash (FNV-1a) of every bit of the body state.
     pub fn state_hash(&self) -> u64 {
+        self.hash_of(0..self.bodies.len())
+    }
+
+    /// As [`Self::state_hash`], of some bodies.
+    fn hash_of(&self, bodies: Range<usize>) -> u64 {
         let b = &self.bodies;
         let arrays = [
             &b.position_x,
@@ -462,7 +516,7 @@ impl World {
             &b.angular_velocity,
         ];
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-        for value in arrays.into_iter().flat_map(|array| array.iter()) {
+        for value in arrays.into_iter().flat_map(|array| &array[bodies.clone()]) {
             // The sign of a NaN depends on the build, so all NaNs hash alike.
             let bits = if value.is_nan() { f32::NAN } else { *value }.to_bits();
             hash = (hash ^ u64::from(bits)).wrapping_mul(0x0000_0100_0000_01b3);

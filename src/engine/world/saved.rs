@@ -22,6 +22,11 @@ pub(super) fn one() -> f32 {
     1.0
 }
 
+/// Default size of groups of saved settings.
+pub(super) fn group_size() -> usize {
+    super::settings::GROUP_SIZE
+}
+
 /// Default number of threads of saved settings.
 pub(super) fn one_thread() -> usize {
     1

@@ -10,6 +10,10 @@ use crate::narrowphase::frozen::{FreezeLimits, Freezing};
 use crate::params::{Budget, Parameters, Without};
 use crate::solvers::{self, Variant};
 
+/// Default of [`Settings::group_size`]: with records of 100 to 200 bytes per contact and copies of 128, groups take half of a
+/// second-level cache of 1 MiB.
+pub const GROUP_SIZE: usize = 2048;
+
 /// The order in which constraints are solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -119,6 +123,10 @@ pub struct Settings {
     /// [`MOST_THREADS`](crate::workers::MOST_THREADS). Every number gives the same bits. Small scenes use one.
     #[cfg_attr(feature = "serde", serde(default = "super::saved::one_thread"))]
     pub threads: usize,
+    /// Number of contacts in a group of islands, which is solved while its data are in the cache; 0: the whole world at once.
+    /// Every number gives the same bits.
+    #[cfg_attr(feature = "serde", serde(default = "super::saved::group_size"))]
+    pub group_size: usize,
     /// Extra kernel features to compile in, to measure their cost.
     pub extra_features: Features,
 }
@@ -156,6 +164,7 @@ impl Settings {
             rotation: RotationUpdate::default(),
             continuous: solver.continuous,
             threads: 1,
+            group_size: GROUP_SIZE,
             extra_features: Features::NONE,
         }
     }

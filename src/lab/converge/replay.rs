@@ -181,10 +181,12 @@ impl<'a> Replay<'a> {
             record_impulses,
             impacts: ImpactLaw::None,
             points,
+            has_discs: false,
         };
         // The rows start at v*, which includes forces already, so nothing is added to them.
         let motion = MotionInput {
             gravity: [0.0; 2],
+            gravities: &[],
             h,
             features,
             integrator: Integrator::SemiImplicitEuler,

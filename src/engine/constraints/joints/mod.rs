@@ -556,6 +556,12 @@ impl<T: JointType> ConstraintType for Joints<T> {
         self.angles[constraint]
     }
 
+    fn restart(&mut self, constraint: usize) {
+        let kept = T::kept(self.form);
+        self.kept[constraint * kept..][..kept].fill(0.0);
+        self.angles[constraint] = 0.0;
+    }
+
     fn boxed(&self) -> Box<dyn ConstraintType> {
         Box::new(self.clone())
     }

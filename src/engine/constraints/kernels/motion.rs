@@ -42,9 +42,11 @@ pub enum RotationUpdate {
 
 /// Inputs of [`Motion::load`] besides the bodies.
 #[derive(Clone, Copy, Debug)]
-pub struct MotionInput {
+pub struct MotionInput<'a> {
     /// Gravity (m/s²).
     pub gravity: [f32; 2],
+    /// Gravity of each body instead, if not empty (m/s²). `[bodies]`
+    pub gravities: &'a [[f32; 2]],
     /// Substep (s).
     pub h: f32,
     /// Features of the scene itself.
@@ -74,8 +76,14 @@ pub struct Motion {
 
 impl Motion {
     /// Fills the rows (one per body and one inert row at the end) and the velocity increments.
-    pub fn load(&mut self, bodies: &Bodies, rows: &mut Vec<BodyRow>, step: &MotionInput, workers: &Workers) {
-        let &MotionInput { gravity, h, features, integrator, rotation } = step;
+    pub fn load(
+        &mut self,
+        bodies: &Bodies,
+        rows: &mut Vec<BodyRow>,
+        step: &MotionInput<'_>,
+        workers: &Workers,
+    ) {
+        let &MotionInput { gravity, gravities, h, features, integrator, rotation } = step;
         let count = bodies.len();
         (self.h, self.integrator, self.rotation) = (h, integrator, rotation);
         self.round.clear();
@@ -107,6 +115,7 @@ impl Motion {
                 *increment = [0.0; 4];
                 if moves {
                     let scale = bodies.gravity_scale[i];
+                    let gravity = gravities.get(i).copied().unwrap_or(gravity);
                     *increment = [
                         h * (gravity[0] * scale + bodies.force_x[i] * inv_mass),
                         h * (gravity[1] * scale + bodies.force_y[i] * inv_mass),
@@ -121,6 +130,25 @@ impl Motion {
                 }
             }
         });
+    }
+
+    /// Takes the motion of some bodies from that of all; `round`: whether a body is round.
+    pub(crate) fn select(&mut self, all: &Motion, bodies: &[u32], round: impl Fn(usize) -> bool) {
+        (self.h, self.integrator, self.rotation) = (all.h, all.integrator, all.rotation);
+        let of = |list: &[[f32; 4]], inert: [f32; 4], to: &mut Vec<[f32; 4]>| {
+            to.clear();
+            if !list.is_empty() {
+                to.extend(bodies.iter().map(|&body| list[body as usize]).chain([inert]));
+            }
+        };
+        of(&all.velocity_increment, [0.0; 4], &mut self.velocity_increment);
+        of(&all.damp, [1.0; 4], &mut self.damp);
+        self.free.resize(bodies.len() + 1, [0.0; 4]);
+        self.round.clear();
+        if !all.round.is_empty() {
+            let is_round = |&(_, &body): &(u32, &u32)| round(body as usize);
+            self.round.extend((0..).zip(bodies).filter(is_round).map(|(row, _)| (row, 0.0)));
+        }
     }
 
     /// Velocity increments in free flight per substep: `[h aₓ, h a_y, h α, 0]` per row.

@@ -213,6 +213,9 @@ pub trait ConstraintType: Any + fmt::Debug + Send + Sync {
         0.0
     }
 
+    /// Forgets what is kept of a constraint from step to step.
+    fn restart(&mut self, _constraint: usize) {}
+
     /// A copy that includes the state kept from step to step: it is used to save and restore a world.
     fn boxed(&self) -> Box<dyn ConstraintType>;
 }

@@ -375,6 +375,13 @@ impl Batches {
         }
     }
 
+    /// Exchanges these batches for `other`, without the buffers of records: those stay where they are.
+    pub(crate) fn exchange(&mut self, other: &mut Batches) {
+        std::mem::swap(self, other);
+        std::mem::swap(&mut self.buffer, &mut other.buffer);
+        self.reserve_buffer();
+    }
+
     /// Checks that these batches fit kernels of `width` lanes, and that all their rows and contacts exist.
     ///
     /// Gathers and scatters check this as well. This check runs before the step begins.

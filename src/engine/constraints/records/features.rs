@@ -1,5 +1,7 @@
 //! Features of a scene's constraints; unused ones are not compiled in.
 
+use crate::bodies::BodyKind;
+
 /// Features that the contacts of a scene use, determined as bodies are added.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -103,6 +105,15 @@ pub enum PartnerKind {
 impl PartnerKind {
     /// All kinds.
     pub const ALL: [PartnerKind; 3] = [PartnerKind::Dynamic, PartnerKind::Kinematic, PartnerKind::Static];
+
+    /// The kind of a body.
+    pub(crate) fn of(body: BodyKind) -> Self {
+        match body {
+            BodyKind::Dynamic => PartnerKind::Dynamic,
+            BodyKind::Kinematic => PartnerKind::Kinematic,
+            BodyKind::Static => PartnerKind::Static,
+        }
+    }
 }
 
 /// Offset of each quantity in a constraint record, in lane vectors.

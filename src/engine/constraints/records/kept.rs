@@ -6,6 +6,7 @@
 
 use crate::contacts::Contact;
 use crate::lanes::LaneVec;
+use std::ops::Range;
 
 /// How many numbers a solver keeps from step to step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -77,6 +78,17 @@ impl SolverState {
         let size = self.size.per_body;
         if let Some(own) = self.bodies.get_mut(body * size..(body + 1) * size) {
             own.fill(0.0);
+        }
+    }
+
+    /// Forgets the numbers of contacts of shapes within a range, which meet no others.
+    pub(crate) fn forget_shapes(&mut self, shapes: Range<u32>) {
+        let first = |name: &(u64, [u32; 2])| (name.0 >> 32) as u32;
+        let from = self.names.partition_point(|name| first(name) < shapes.start);
+        for (_, ids) in
+            self.names[from..].iter_mut().take_while(|name| (name.0 >> 32) < u64::from(shapes.end))
+        {
+            *ids = [UNUSED; 2];
         }
     }
 

@@ -1,6 +1,7 @@
 //! Passes over bodies.
 
 use super::Passes;
+use super::jams::speed;
 use crate::clock::Phase;
 use crate::constraints::kernels::motion::Motion;
 use crate::constraints::kernels::velocity::masses::{EffectiveMasses, ScaledMasses};
@@ -47,6 +48,19 @@ impl Passes<'_> {
     /// Body pass: x ← x + h v.
     pub fn integrate_positions(&mut self) {
         self.over_bodies(Phase::Integrate, |rows, motion, workers| motion.integrate_positions(rows, workers));
+    }
+
+    /// Body pass: scales the velocities of bodies with a limit down to it, see [`Workspace::speed_limits`](super::Workspace).
+    pub fn limit_speeds(&mut self) {
+        for &(body, most) in &self.work.speed_limits {
+            let row = &mut self.work.rows[body as usize];
+            let [x, y, spin, inv_mass] = row.velocity;
+            let speed = speed([x, y], spin, inv_mass / row.delta[3]);
+            if speed > most {
+                let part = most / speed;
+                row.velocity = [part * x, part * y, part * spin, inv_mass];
+            }
+        }
     }
 
     /// Body pass: takes the turns of round bodies out of their rows, as the integration of positions does.

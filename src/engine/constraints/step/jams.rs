@@ -48,7 +48,7 @@
 //!
 //! Velocities beyond that are scaled down in each substep before bodies move, and at its end.
 
-use super::{CollisionScene, Passes};
+use super::CollisionScene;
 use crate::bodies::{Bodies, BodyKind};
 use crate::constraints::kernels::types::ConstraintSet;
 use crate::contacts::{Contact, ManifoldPoint};
@@ -93,7 +93,8 @@ pub(crate) struct Jams {
 }
 
 impl Jams {
-    /// Zeroes the impulses of contacts that push against each other, and finds bodies in a jam. `push_speed`: m/s.
+    /// Zeroes the impulses of contacts that push against each other, and limits the speeds of bodies in a jam. `push_speed`:
+    /// m/s.
     pub fn release(&mut self, scene: &mut CollisionScene<'_>, push_speed: f32) {
         let slop = Margins::of(scene.length_unit).slop;
         let (contacts, bodies, types) = (&mut *scene.contacts, scene.bodies, scene.types);
@@ -144,9 +145,11 @@ impl Jams {
         self.forget_jams(contacts, bodies.len());
         for (body, most) in &mut self.jammed {
             let (i, square) = (*body as usize, square_gyration(bodies, *body));
+            let gravity = scene.gravities.get(i).copied().unwrap_or(scene.gravity);
             let had = speed(bodies.velocity(i).to_array(), bodies.angular_velocity[i], square);
-            *most = (2.0 * *most + push_speed).max(had + scene.gravity.length() * scene.dt);
+            *most = (2.0 * *most + push_speed).max(had + Vec2::from(gravity).length() * scene.dt);
         }
+        scene.speed_limits.extend_from_slice(&self.jammed);
     }
 
     /// Zeroes the impulses of bodies in a jam of a squeeze.
@@ -194,26 +197,9 @@ impl Jams {
         }
     }
 
-    /// Clears the list of bodies in a jam.
+    /// Forgets the bodies in a jam.
     pub fn clear(&mut self) {
         self.jammed.clear();
-    }
-
-    /// Bounds the speeds of bodies in a jam.
-    pub fn bound(&self, passes: &mut Passes<'_>) {
-        if self.jammed.is_empty() {
-            return;
-        }
-        let rows = &mut passes.parts().work.rows;
-        for &(body, most) in &self.jammed {
-            let row = &mut rows[body as usize];
-            let [x, y, spin, inv_mass] = row.velocity;
-            let speed = speed([x, y], spin, inv_mass / row.delta[3]);
-            if speed > most {
-                let part = most / speed;
-                row.velocity = [part * x, part * y, part * spin, inv_mass];
-            }
-        }
     }
 
     /// Finds the squeezes, and lists the contacts of bodies in them.
@@ -266,7 +252,7 @@ fn square_gyration(bodies: &Bodies, body: u32) -> f32 {
 }
 
 /// √(v² + ρ²ω²), with ρ² as `gyration` (m²); that of a body that cannot turn is infinite and its spin zero.
-fn speed([x, y]: [f32; 2], spin: f32, gyration: f32) -> f32 {
+pub(super) fn speed([x, y]: [f32; 2], spin: f32, gyration: f32) -> f32 {
     let turning = if gyration.is_finite() { gyration * spin * spin } else { 0.0 };
     (x * x + y * y + turning).sqrt()
 }

@@ -150,6 +150,11 @@ impl<'a> Passes<'a> {
         !self.input.without.leaves_out(mechanism)
     }
 
+    /// Whether a pair of shapes that may touch has a disc.
+    pub fn has_discs(&self) -> bool {
+        self.input.has_discs
+    }
+
     /// Number of points of all contacts.
     pub fn points(&self) -> usize {
         self.input.points

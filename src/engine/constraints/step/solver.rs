@@ -7,7 +7,6 @@ use crate::constraints::records::graph::Graph;
 use crate::contacts::Contact;
 use crate::narrowphase::circles::Rolling;
 use crate::params::{Parameters, Without};
-use glam::Vec2;
 use std::fmt;
 
 /// A solver in one world: its schedule, and the data that it keeps from step to step.
@@ -66,14 +65,16 @@ pub struct CollisionScene<'a> {
     pub contacts: &'a mut [Contact],
     /// Constraints of other types than contacts.
     pub types: &'a [ConstraintSet],
-    /// Whether a pair of shapes that may touch has a disc.
-    pub has_discs: bool,
+    /// Bodies whose speed [`Passes::limit_speeds`] bounds in this step, see [`Workspace`](super::Workspace).
+    pub speed_limits: &'a mut Vec<(u32, f32)>,
     /// The solver's own parameters.
     pub parameters: Parameters,
     /// Mechanisms of the solver that are left out.
     pub without: Without,
     /// Gravity (m/s²).
-    pub gravity: Vec2,
+    pub gravity: [f32; 2],
+    /// Gravity of each body instead, if not empty (m/s²). `[bodies]`
+    pub gravities: &'a [[f32; 2]],
     /// Step (s).
     pub dt: f32,
     /// Size of typical bodies (m).

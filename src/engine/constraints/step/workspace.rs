@@ -34,6 +34,9 @@ pub struct Workspace {
     pub kept: SolverState,
     /// Side records for restitution; empty in scenes without restitution.
     pub impacts: ImpactRecords,
+    /// Bodies that [`Passes::limit_speeds`](super::Passes::limit_speeds) slows down, in ascending order, each with the largest
+    /// √(v² + ρ²ω²) that it may have (m/s); ρ is its radius of gyration.
+    pub speed_limits: Vec<(u32, f32)>,
     /// Vectors that solvers have returned, for reuse.
     pub vectors: Vec<PointVector>,
     /// Called after each iteration of a solver.
@@ -70,6 +73,7 @@ impl Clone for Workspace {
             poses: self.poses.clone(),
             kept: self.kept.clone(),
             impacts: self.impacts.clone(),
+            speed_limits: self.speed_limits.clone(),
             vectors: self.vectors.clone(),
             watch: None,
             observe: self.observe,
@@ -116,4 +120,6 @@ pub struct StepInput {
     pub impacts: ImpactLaw,
     /// Number of points of all contacts, to count rows.
     pub points: usize,
+    /// Whether a pair of shapes that may touch has a disc.
+    pub has_discs: bool,
 }

@@ -1,0 +1,376 @@
+//! Groups of islands, each solved as a whole while its data are in the cache.
+//!
+//! Dynamic bodies that contacts connect are an island. Islands do not see each other within a step, and the colors of an
+//! island follow from its own contacts in their order. So a group of islands, with rows, contacts and records of its own,
+//! has the bits of the same islands in the whole world, whatever the group.
+//!
+//! A step of the whole world sweeps all records from memory several times per substep. A group is loaded once, swept
+//! through all substeps, and stored. The groups of a thread follow each other in the same memory, which stays in its cache. An
+//! island that is larger than a group is solved by all threads together.
+
+#![allow(unsafe_code, reason = "threads that share rows and contacts, each those of other groups")]
+
+use super::World;
+use crate::bodies::{Bodies, BodyKind};
+use crate::clock::{Clock, Timings};
+use crate::constraints::records::batches::Batches;
+use crate::constraints::step::assign::{Assignment, Sides};
+use crate::constraints::{Features, PartnerKind, Solver, StepInput, WorkCount, Workspace};
+use crate::contacts::Contact;
+use crate::disjoint::DisjointSets;
+use crate::lanes::{BodyRow, LaneWidth, Shared, SharedRows};
+use crate::solvers::{self, Variant};
+use crate::workers::Workers;
+use std::sync::{Mutex, PoisonError};
+
+/// Weight of a contact; that of a body is 1.
+const CONTACT: u32 = 4;
+
+/// Least number of groups for one thread. A smaller problem is in the third-level cache as a whole, which takes less time
+/// than to copy it.
+const LEAST_ALONE: usize = 8;
+
+/// Least number of groups for several threads, which save the barriers between colors.
+const LEAST_SHARED: usize = 4;
+
+/// Group of a body that is in none.
+const NONE: u32 = u32::MAX;
+
+/// The groups of a step; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Groups {
+    list: Vec<Group>,
+    /// One for each thread.
+    seats: Vec<Seat>,
+    /// Number of groups of the last step; 0 if it was solved as a whole.
+    count: usize,
+    islands: DisjointSets,
+    /// Weight of the island of which a body is the least one. `[bodies]`
+    weights: Vec<u32>,
+    /// Group of each body that can move. `[bodies]`
+    group_of: Vec<u32>,
+    /// Row of each body in the group that is being filled. `[bodies]`
+    row_of: Vec<u32>,
+}
+
+/// A group of islands.
+#[derive(Clone, Debug, Default)]
+struct Group {
+    /// Its bodies, in ascending order, with the static and kinematic ones that they touch.
+    bodies: Vec<u32>,
+    kinds: Vec<BodyKind>,
+    /// Its contacts, in ascending order.
+    contacts: Vec<u32>,
+    /// Rows of the bodies of each contact.
+    edges: Vec<[u32; 2]>,
+    /// `bodies`, `kinds` and `edges` of the last assignment.
+    last: (Vec<u32>, Vec<BodyKind>, Vec<[u32; 2]>),
+    /// Whether all threads solve it together.
+    is_large: bool,
+    lanes: Batches,
+    serial: Batches,
+    assignment: Assignment,
+    /// Rows of its kinematic bodies after the step, with the bodies.
+    kinematic: Vec<(u32, BodyRow)>,
+    count: WorkCount,
+    timings: Timings,
+}
+
+/// Where a thread solves its groups.
+#[derive(Clone, Debug, Default)]
+struct Seat {
+    work: Workspace,
+    /// The contacts of a group, between rows of `work`.
+    contacts: Vec<Contact>,
+    solver: Option<(Box<dyn Solver>, &'static Variant)>,
+    seen_rows: Vec<u32>,
+}
+
+/// What all groups share.
+#[derive(Clone, Copy)]
+struct Whole<'a> {
+    work: &'a Workspace,
+    bodies: &'a Bodies,
+    input: &'a StepInput,
+    timed: bool,
+    variant: &'static Variant,
+}
+
+impl Groups {
+    /// Whether the step is solved in groups.
+    pub fn are_in_use(&self) -> bool {
+        self.count > 0
+    }
+
+    /// Solves the next step as a whole.
+    pub fn leave(&mut self) {
+        self.count = 0;
+    }
+
+    fn in_use(&self) -> &[Group] {
+        &self.list[..self.count]
+    }
+
+    /// Lanes of the widest group.
+    pub fn width(&self) -> usize {
+        self.in_use().iter().map(|group| group.lanes.width()).max().unwrap_or(1)
+    }
+
+    /// Divides islands into groups of about `size` contacts. `false`, and no groups, if a single island has most contacts or
+    /// there would be fewer than `least` groups.
+    fn divide(&mut self, [size, least]: [usize; 2], kinds: &[BodyKind], contacts: &[Contact]) -> bool {
+        let Groups { list, count, islands, weights, group_of, row_of, .. } = self;
+        let is_dynamic = |body: u32| kinds[body as usize] == BodyKind::Dynamic;
+        *count = 0;
+        islands.begin(kinds.len());
+        for contact in contacts.iter().filter(|contact| is_dynamic(contact.body_a)) {
+            islands.join(contact.body_a, contact.body_b);
+        }
+        weights.clear();
+        weights.resize(kinds.len(), 0);
+        contacts.iter().for_each(|contact| weights[islands.least(contact.body_b) as usize] += CONTACT);
+        for body in (0..kinds.len() as u32).filter(|&body| kinds[body as usize] != BodyKind::Static) {
+            weights[islands.least(body) as usize] += 1;
+        }
+        let (all, largest) = (weights.iter().sum::<u32>(), weights.iter().copied().max().unwrap_or(0));
+        let room = size as u32 * CONTACT;
+        if 2 * largest > all || (all / room) < least as u32 {
+            return false;
+        }
+        group_of.clear();
+        group_of.resize(kinds.len(), NONE);
+        let (mut group, mut weight) = (0, 0);
+        for body in (0..kinds.len() as u32).filter(|&body| kinds[body as usize] != BodyKind::Static) {
+            let least = islands.least(body);
+            if least == body {
+                let own = weights[body as usize];
+                if weight > 0 && weight + own > room {
+                    (group, weight) = (group + 1, 0);
+                }
+                weight += own;
+                if list.len() <= group {
+                    list.push(Group::default());
+                }
+                if weight == own {
+                    list[group].begin();
+                }
+                list[group].is_large |= own > 2 * room;
+            }
+            group_of[body as usize] = if least == body { group as u32 } else { group_of[least as usize] };
+            list[group_of[body as usize] as usize].bodies.push(body);
+        }
+        for (i, contact) in (0..).zip(contacts) {
+            let of = group_of[contact.body_b as usize];
+            let group = &mut list[of as usize];
+            group.contacts.push(i);
+            if group_of[contact.body_a as usize] != of {
+                group.bodies.push(contact.body_a);
+            }
+        }
+        *count = group + 1;
+        row_of.resize(kinds.len(), 0);
+        for group in &mut list[..*count] {
+            group.bodies.sort_unstable();
+            group.bodies.dedup();
+            group.kinds.extend(group.bodies.iter().map(|&body| kinds[body as usize]));
+            (0..).zip(&group.bodies).for_each(|(row, &body)| row_of[body as usize] = row);
+            let Group { edges, contacts: own, .. } = group;
+            edges.extend(own.iter().map(|&i| {
+                let Contact { body_a, body_b, .. } = contacts[i as usize];
+                [body_a, body_b].map(|body| row_of[body as usize])
+            }));
+        }
+        true
+    }
+
+    /// Assigns the lanes of every group, except where they would be those of the last step.
+    fn assign(&mut self, widths: [LaneWidth; 2], features: &Features, is_new: bool, workers: &Workers) {
+        self.seats.resize_with(workers.count(), Seat::default);
+        each(&mut self.list[..self.count], &mut self.seats, workers, |group, seat| {
+            if is_new || !group.is_as_before() {
+                group.assign(widths, features, seat);
+            }
+        });
+    }
+
+    /// Color of each of `contacts` contacts in its group; see [`World::contact_colors`].
+    pub fn contact_colors(&self, contacts: usize) -> Vec<Option<u16>> {
+        let mut colors = vec![None; contacts];
+        for group in self.in_use() {
+            let own = group.assignment.contact_colors(group.contacts.len());
+            group.contacts.iter().zip(own).for_each(|(&i, color)| colors[i as usize] = color);
+        }
+        colors
+    }
+}
+
+/// Calls `each` with every group, in the order of the list; a thread takes the next one when it has finished one.
+fn each(
+    groups: &mut [Group],
+    seats: &mut [Seat],
+    workers: &Workers,
+    each: impl Fn(&mut Group, &mut Seat) + Sync,
+) {
+    let queue = Mutex::new(groups.iter_mut());
+    workers.each(seats.iter_mut(), |seat| {
+        loop {
+            let next = queue.lock().unwrap_or_else(PoisonError::into_inner).next();
+            let Some(group) = next else { return };
+            each(group, seat);
+        }
+    });
+}
+
+impl Group {
+    /// Empties it for a new division.
+    fn begin(&mut self) {
+        let Group { bodies, kinds, edges, last, .. } = self;
+        std::mem::swap(bodies, &mut last.0);
+        std::mem::swap(kinds, &mut last.1);
+        std::mem::swap(edges, &mut last.2);
+        bodies.clear();
+        kinds.clear();
+        edges.clear();
+        self.contacts.clear();
+        self.is_large = false;
+    }
+
+    fn is_as_before(&self) -> bool {
+        self.edges == self.last.2 && self.kinds == self.last.1 && self.bodies == self.last.0
+    }
+
+    /// Assigns the lanes.
+    fn assign(&mut self, widths: [LaneWidth; 2], features: &Features, seat: &mut Seat) {
+        self.exchange(seat);
+        let Group { edges, kinds, assignment, is_large, .. } = self;
+        let Seat { work, contacts, seen_rows, .. } = seat;
+        contacts.clear();
+        contacts.extend(edges.iter().map(|&[body_a, body_b]| Contact {
+            body_a,
+            body_b,
+            ..Contact::default()
+        }));
+        let partner = |row: u32| PartnerKind::of(kinds[row as usize]);
+        let sides = Sides { bodies: kinds.len(), partner, levels: None };
+        assignment.colored(work, widths, features, contacts, &sides);
+        if *is_large {
+            work.lanes.check_disjoint(kinds.len() as u32, seen_rows);
+        }
+        self.exchange(seat);
+    }
+
+    /// Exchanges its batches for those of the seat.
+    fn exchange(&mut self, seat: &mut Seat) {
+        seat.work.lanes.exchange(&mut self.lanes);
+        seat.work.serial.exchange(&mut self.serial);
+    }
+
+    /// Solves the group: takes rows and contacts, runs the solver, and gives back what it changed.
+    ///
+    /// Rows of kinematic bodies may be in several groups; they are noted.
+    fn solve(&mut self, seat: &mut Seat, rows: SharedRows<'_>, contacts: Shared<'_, Contact>, of: Whole<'_>) {
+        self.exchange(seat);
+        let Seat { work, contacts: copies, solver, .. } = seat;
+        let Group { bodies, kinds, edges, .. } = self;
+        work.rows.clear();
+        work.rows.extend(bodies.iter().map(|&body| rows.get(body as usize)));
+        work.rows.push(BodyRow::default());
+        work.motion.select(&of.work.motion, bodies, |body| of.bodies.round[body]);
+        work.speed_limits.clear();
+        for &(body, limit) in &of.work.speed_limits {
+            work.speed_limits.extend(bodies.binary_search(&body).ok().map(|row| (row as u32, limit)));
+        }
+        copies.clear();
+        copies.extend(self.contacts.iter().zip(&*edges).map(|(&i, &[body_a, body_b])| Contact {
+            body_a,
+            body_b,
+            ..contacts.get(i as usize)
+        }));
+        let points = copies.iter().map(|contact| contact.manifold.count as usize).sum();
+        let input = StepInput { points, ..*of.input };
+        let width = LaneWidth::from_lanes(work.lanes.width()).unwrap_or(LaneWidth::W1);
+        let mut clock = Clock::start(of.timed);
+        let (solver, _) = match solver {
+            Some(known) if std::ptr::eq(known.1, of.variant) => known,
+            other => other.insert(((of.variant.make)(), of.variant)),
+        };
+        self.count = solvers::run(solver.as_mut(), work, copies, &mut clock, &input, width);
+        self.timings = clock.stop();
+        work.motion.finish(&mut work.rows);
+        self.kinematic.clear();
+        for ((row, &body), kind) in work.rows.iter().zip(&*bodies).zip(&*kinds) {
+            match kind {
+                BodyKind::Dynamic => rows.set(body as usize, *row),
+                BodyKind::Kinematic => self.kinematic.push((body, *row)),
+                BodyKind::Static => {}
+            }
+        }
+        for (copy, &i) in copies.iter().zip(&self.contacts) {
+            let Contact { body_a, body_b, .. } = contacts.get(i as usize);
+            contacts.set(i as usize, Contact { body_a, body_b, ..*copy });
+        }
+        self.exchange(seat);
+    }
+}
+
+impl World {
+    /// Divides the step into groups if that pays, and assigns their lanes. `is_new`: solver, widths or features changed.
+    pub(super) fn group_islands(&mut self, features: &Features, is_new: bool) -> bool {
+        let World { groups, settings, bodies, contacts, work, .. } = self;
+        let least = if work.workers.count() > 1 { LEAST_SHARED } else { LEAST_ALONE };
+        if !groups.divide([settings.group_size, least], &bodies.kind, contacts) {
+            return false;
+        }
+        groups.assign(settings.widths(), features, is_new, &work.workers);
+        let of = groups.in_use();
+        let slots = |group: &Group| group.lanes.lanes() + group.serial.lanes();
+        self.counts.colors = of.iter().map(|group| group.assignment.colors).max().unwrap_or(0);
+        self.counts.groups = of.len();
+        self.counts.overflow = of.iter().map(|group| group.assignment.overflow).sum();
+        self.counts.lane_slots = of.iter().map(slots).sum();
+        self.counts.constraint_bytes =
+            of.iter().map(|group| group.lanes.bytes() + group.serial.bytes()).sum();
+        true
+    }
+
+    /// Solves every group, after the rows have been loaded.
+    pub(super) fn solve_groups(&mut self, clock: &mut Clock, input: &StepInput) -> WorkCount {
+        let World { groups, work, contacts, bodies, settings, solver_is, .. } = self;
+        let (mut rows, mut workers) = (std::mem::take(&mut work.rows), std::mem::take(&mut work.workers));
+        let of = Whole { work, bodies, input, timed: settings.timed, variant: solver_is };
+        let (list, seats) = (&mut groups.list[..groups.count], &mut groups.seats);
+        seats.resize_with(workers.count(), Seat::default);
+        {
+            let rows = Shared::from(&mut rows[..]);
+            let contacts = Shared::from(&mut contacts[..]);
+            for group in list.iter_mut().filter(|group| group.is_large) {
+                std::mem::swap(&mut seats[0].work.workers, &mut workers);
+                group.solve(&mut seats[0], rows, contacts, of);
+                std::mem::swap(&mut seats[0].work.workers, &mut workers);
+            }
+            // SAFETY: a contact and a dynamic body are in one group. Rows of other bodies are only read.
+            let (rows, contacts) = unsafe { (rows.sent(), contacts.sent()) };
+            each(list, seats, &workers, |group, seat| {
+                if !group.is_large {
+                    group.solve(seat, rows.get(), contacts.get(), of);
+                }
+            });
+        }
+        let mut count = WorkCount::default();
+        for (i, group) in (0..).zip(&*list) {
+            for &(body, row) in &group.kinematic {
+                if groups.group_of[body as usize] == i {
+                    rows[body as usize] = row;
+                }
+            }
+            count.sweeps = count.sweeps.max(group.count.sweeps);
+            count.row_updates += group.count.row_updates;
+            count.impact_visits += group.count.impact_visits;
+            count.cut_impacts += group.count.cut_impacts;
+            count.unsolved += group.count.unsolved;
+        }
+        (work.rows, work.workers) = (rows, workers);
+        clock.divide(list.iter().map(|group| &group.timings));
+        count
+    }
+}

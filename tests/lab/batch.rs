@@ -1,0 +1,124 @@
+//! Law: a copy of a batch has the bits that it has alone, whatever the others do.
+
+use crate::common::on_ground;
+use simpulse::engine::batch::Batch;
+use simpulse::engine::error::Error;
+use simpulse::engine::prelude::*;
+use simpulse::engine::solvers::VARIANTS;
+use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
+
+/// Boxes and discs that fall on each other, some fast; the higher the number, the higher they start.
+fn fall(copy: usize) -> Scene {
+    let height = 0.2 * copy as f64;
+    let boxed = |x: f64, y: f64| SceneBody::dynamic([x, y + height], SceneShape::rectangle(0.5, 0.4));
+    let disc = SceneShape { restitution: 0.5, ..SceneShape::disc(0.3) };
+    on_ground(vec![
+        boxed(0.0, 0.5),
+        boxed(0.3, 1.6),
+        SceneBody::dynamic([0.1, 3.0 + height], disc),
+        boxed(-0.4, 4.0).moving([0.5, -60.0], 1.0),
+    ])
+}
+
+/// A batch of `copies`; copy 2 has no friction.
+fn batch(settings: Settings, copies: usize) -> Batch {
+    let build = |copy: usize, world: &mut World| {
+        for body in fall(copy).body_defs().unwrap() {
+            world.add_body(&body)?;
+        }
+        Ok(())
+    };
+    Batch::new(settings, copies, build).unwrap()
+}
+
+#[test]
+fn a_copy_has_the_bits_that_it_has_alone() {
+    for variant in VARIANTS.iter().filter(|variant| variant.is_local) {
+        for group_size in [0, 1] {
+            let settings = || Settings { group_size, ..Settings::new(variant) };
+            let mut all = batch(settings(), 24);
+            let mut alone: Vec<World> = (0..24).map(|copy| fall(copy).build(settings()).unwrap()).collect();
+            all.set_gravity(5, [1.0, -3.0]).unwrap();
+            alone[5].settings.gravity = [1.0, -3.0];
+            for step in 0..120 {
+                assert_eq!(all.step().unwrap(), [0; 0]);
+                for (copy, world) in alone.iter_mut().enumerate() {
+                    world.step().unwrap();
+                    assert_eq!(all.state_hash(copy), world.state_hash(), "{} {step} {copy}", variant.name);
+                }
+                if step == 60 {
+                    all.reset(7);
+                    alone[7] = fall(7).build(settings()).unwrap();
+                }
+            }
+        }
+    }
+}
+
+/// Carts on rails with poles.
+fn carts(copies: usize) -> Batch {
+    Batch::new(Settings::new(solvers::SOFT_STEP), copies, |copy, world| {
+        let rail = world.add_body(&BodyDef::fixed([0.0; 2]))?;
+        let cart = world.add_body(&BodyDef::dynamic([0.0; 2]).with(ShapeDef::rectangle(0.25, 0.15)?))?;
+        let pole = BodyDef::dynamic([0.0, 0.5]).with_angular_velocity(0.01 * copy as f64);
+        let pole = world.add_body(&pole.with(ShapeDef::rectangle(0.02, 0.5)?))?;
+        world.add_joint(&Joint::prismatic(rail, cart, [1.0, 0.0]).anchor([0.0; 2]))?;
+        world.add_joint(&Joint::revolute(cart, pole).anchor([0.0; 2]))?;
+        Ok(())
+    })
+    .unwrap()
+}
+
+#[test]
+fn a_reset_starts_joints_again_and_actions_move_their_copy_alone() {
+    let (mut all, mut fresh) = (carts(3), carts(3));
+    let mut forces = vec![0.0; all.action_len()];
+    forces[(3 + 1) * Batch::ACTED] = 7.0;
+    all.act(&forces);
+    (0..90).for_each(|_| assert!(all.step().unwrap().is_empty() && fresh.step().unwrap().is_empty()));
+    assert_eq!([0, 2].map(|copy| all.state_hash(copy)), [0, 2].map(|copy| fresh.state_hash(copy)));
+    assert_ne!(all.state_hash(1), fresh.state_hash(1));
+    let mut seen = vec![0.0; all.observation_len()];
+    all.observe(&mut seen);
+    // The cart and the pole have 0.5 kg together and 7 N.
+    assert!(seen[(3 + 1) * Batch::OBSERVED] > 1.0, "{seen:?}");
+
+    let mut fresh = carts(3);
+    all.act(&vec![0.0; forces.len()]);
+    (0..3).for_each(|copy| all.reset(copy));
+    (0..30).for_each(|_| assert!(all.step().unwrap().is_empty() && fresh.step().unwrap().is_empty()));
+    assert_eq!([0, 1, 2].map(|copy| all.state_hash(copy)), [0, 1, 2].map(|copy| fresh.state_hash(copy)));
+}
+
+#[test]
+fn a_copy_that_diverges_is_named_and_can_be_reset() {
+    let mut all = carts(3);
+    let mut forces = vec![0.0; all.action_len()];
+    forces[(3 + 1) * Batch::ACTED] = 1e12;
+    all.act(&forces);
+    assert_eq!(all.step().unwrap(), [1]);
+    all.act(&vec![0.0; forces.len()]);
+    all.reset(1);
+    assert!(all.step().unwrap().is_empty());
+    let mut fresh = carts(3);
+    fresh.step().unwrap();
+    assert_eq!(all.state_hash(1), fresh.state_hash(1));
+}
+
+#[test]
+fn a_batch_says_what_is_wrong_with_a_copy() {
+    let build = |copies: usize, odd: usize| {
+        let result = Batch::new(Settings::default(), copies, |copy, world: &mut World| {
+            let disc = ShapeDef::circle(0.5)?;
+            world.add_body(&BodyDef::dynamic([0.0; 2]).with(disc.clone()))?;
+            if copy == odd {
+                world.add_body(&BodyDef::dynamic([9.0, 0.0]).with(disc))?;
+            }
+            Ok::<(), Error>(())
+        });
+        result.map(|batch| batch.copies()).map_err(|e| e.to_string())
+    };
+    assert_eq!(build(3, 9), Ok(3));
+    assert_eq!(build(0, 9), Err("copies: must be at least 1".into()));
+    assert_eq!(build(3, 1), Err("copy 1: has 2 bodies, and the first copy has 1".into()));
+}
