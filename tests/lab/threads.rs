@@ -3,8 +3,9 @@
 use crate::common::{on_ground, scene, with_width};
 use bytemuck::bytes_of;
 use simpulse::engine::bodies::BodyKind;
+use simpulse::engine::constraints::Schedule;
 use simpulse::engine::lanes::LaneWidth;
-use simpulse::engine::solvers::VARIANTS;
+use simpulse::engine::solvers::{VARIANTS, Variant, find};
 use simpulse::engine::world::Settings;
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 
@@ -90,4 +91,17 @@ fn every_division_into_groups_gives_the_same_bits() {
             }
         }
     }
+}
+
+#[test]
+fn a_panic_in_a_thread_is_an_error_of_the_step_and_ends_nothing_else() {
+    static BROKEN: Variant = Variant { make: || Schedule::boxed(|_| panic!("broken")), ..Variant::BASE };
+    let soft_step = find("soft_step").unwrap();
+    let mut world =
+        scene("large_pyramid").build(Settings { threads: 2, ..Settings::new(soft_step) }).unwrap();
+    world.step().unwrap();
+    world.settings.solver = &BROKEN;
+    assert_eq!(world.step().unwrap_err().to_string(), "a thread panicked: broken");
+    world.settings.solver = soft_step;
+    world.step().unwrap();
 }

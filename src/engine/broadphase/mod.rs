@@ -120,11 +120,8 @@ impl BroadPhase {
         }
     }
 
-    /// Shapes that `shape` may meet: those of its space, or all.
-    pub(crate) fn around(&self, shape: u32) -> std::ops::Range<u32> {
-        match self {
-            BroadPhase::Spaces(spaces) => spaces.around(shape),
-            _ => 0..u32::MAX,
-        }
+    /// Number of the space of a shape; shapes of different spaces never meet.
+    pub(crate) fn space_of(&self, shape: u32) -> usize {
+        if let BroadPhase::Spaces(spaces) = self { spaces.of(shape) } else { 0 }
     }
 }

@@ -27,9 +27,14 @@ impl Spaces {
         self.ends.push(shapes as u32);
     }
 
+    /// Number of the space of a shape.
+    pub fn of(&self, shape: u32) -> usize {
+        self.ends.partition_point(|&end| end <= shape)
+    }
+
     /// The shapes in the space of a shape; empty if it is in none.
     pub fn around(&self, shape: u32) -> Range<u32> {
-        let space = self.ends.partition_point(|&end| end <= shape);
+        let space = self.of(shape);
         if space < self.ends.len() { self.shapes(space) } else { 0..0 }
     }
 
@@ -127,7 +132,7 @@ mod tests {
             (1..=3).for_each(|k| spaces.end(k * each as usize));
             let of = |turns: [f32; 3]| {
                 let spaces = (0..3).zip(turns).map(|(k, turn)| {
-                    let number = |proxy: Proxy| Proxy { body: proxy.body + k * each, ..proxy };
+                    let number = move |proxy: Proxy| Proxy { body: proxy.body + k * each, ..proxy };
                     proxies(each, turn).into_iter().map(number)
                 });
                 spaces.flatten().collect::<Vec<Proxy>>()

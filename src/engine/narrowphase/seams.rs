@@ -46,6 +46,9 @@ struct Seam {
     way: Vec2,
 }
 
+/// Space and shape of a corner, the corner as in a [`Seam`], its position (m), and the directions of both edges.
+type End = ([usize; 2], Vec2, [f64; 2], [Vec2; 2]);
+
 /// The shared corners of all static shapes; see the [module](self).
 #[derive(Clone, Debug, Default)]
 pub struct Seams {
@@ -67,39 +70,40 @@ fn corners(shape: &Shape, rotation: Vec2) -> ([Vec2; MAX_POLYGON_VERTICES], usiz
 }
 
 impl Seams {
-    /// Finds the shared corners among the shapes for which `is_ground`. `bodies` and `shape_body` are those of the world.
+    /// Finds the corners that shapes of one space share. `ground` gives the space of a shape of the ground. `bodies` and
+    /// `shape_body` are those of the world.
     pub fn build(
         &mut self,
         bodies: &Bodies,
         shapes: &[Shape],
         shape_body: &[u32],
-        is_ground: impl Fn(usize) -> bool,
+        ground: impl Fn(usize) -> Option<usize>,
         margins: Margins,
     ) {
         let tolerance = f64::from(SAME * margins.slop);
         let cell = |at: [f64; 2]| at.map(|x| (x / tolerance).floor() as i64);
-        let mut places: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
-        // Shape, corner, position and the directions of both edges of each corner.
-        let mut ends: Vec<(usize, Vec2, [f64; 2], [Vec2; 2])> = Vec::new();
-        for shape in (0..shapes.len()).filter(|&shape| is_ground(shape)) {
+        // By space and cell.
+        let mut places: HashMap<(usize, [i64; 2]), Vec<usize>> = HashMap::new();
+        let mut ends: Vec<End> = Vec::new();
+        for (shape, space) in (0..shapes.len()).filter_map(|shape| Some((shape, ground(shape)?))) {
             let body = shape_body[shape] as usize;
             let ([x, y], (all, count)) =
                 (bodies.center(body), corners(&shapes[shape], bodies.pose(body).rotation));
             for (i, &corner) in all[..count].iter().enumerate() {
                 let at = [x + f64::from(corner.x), y + f64::from(corner.y)];
                 let way = |other: usize| (all[other % count] - corner).normalize_or_zero();
-                places.entry(cell(at)).or_default().push(ends.len());
-                ends.push((shape, corner, at, [way(i + 1), way(i + count - 1)]));
+                places.entry((space, cell(at))).or_default().push(ends.len());
+                ends.push(([space, shape], corner, at, [way(i + 1), way(i + count - 1)]));
             }
         }
         self.starts.clear();
         self.seams.clear();
-        for (e, &(shape, corner, at, _)) in ends.iter().enumerate() {
+        for (e, &([space, shape], corner, at, _)) in ends.iter().enumerate() {
             self.starts.resize(shape + 1, self.seams.len() as u32);
             let [column, row] = cell(at);
             let near = (-1..=1).flat_map(|i| (-1..=1).map(move |j| [column + i, row + j]));
-            for &other in near.filter_map(|cell| places.get(&cell)).flatten() {
-                let (of, _, to, ways) = ends[other];
+            for &other in near.filter_map(|cell| places.get(&(space, cell))).flatten() {
+                let ([_, of], _, to, ways) = ends[other];
                 if e != other && of != shape && (0..2).all(|k| (to[k] - at[k]).abs() <= tolerance) {
                     self.seams.extend(ways.map(|way| Seam { corner, way }));
                 }

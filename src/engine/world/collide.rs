@@ -109,11 +109,12 @@ impl World {
 
         let margins = Margins::of(self.settings.length_unit);
         if std::mem::take(&mut self.seams_are_stale) {
-            let is_ground = |shape: usize| {
+            let ground = |shape: usize| {
                 let body = self.shape_body[shape] as usize;
-                self.bodies.kind[body] == BodyKind::Static && self.slots.lives[body]
+                let is_ground = self.bodies.kind[body] == BodyKind::Static && self.slots.lives[body];
+                is_ground.then(|| self.broadphase.space_of(shape as u32))
             };
-            self.seams.build(&self.bodies, &self.shapes, &self.shape_body, is_ground, margins);
+            self.seams.build(&self.bodies, &self.shapes, &self.shape_body, ground, margins);
         }
         let is_ghost = |contact: &Contact| self.seams.is_ghost(contact, &self.bodies, &self.shapes, margins);
         let mut ghost_points = 0;

@@ -108,14 +108,20 @@ pub enum StepError {
     Settings(Error),
     /// A body diverged.
     Diverged(Divergence),
+    /// A part of the step panicked, with several threads: what it said. The world is in no defined state.
+    Panicked(String),
 }
 
 impl StepError {
     /// The divergence; `None` for a setting out of its range.
+    ///
+    /// # Panics
+    /// If a part of the step did.
     pub fn divergence(self) -> Option<Divergence> {
         match self {
             StepError::Settings(_) => None,
             StepError::Diverged(divergence) => Some(divergence),
+            StepError::Panicked(message) => panic!("{message}"),
         }
     }
 }
@@ -127,6 +133,7 @@ impl std::fmt::Display for StepError {
         match self {
             StepError::Settings(error) => error.fmt(f),
             StepError::Diverged(divergence) => divergence.fmt(f),
+            StepError::Panicked(message) => write!(f, "a thread panicked: {message}"),
         }
     }
 }

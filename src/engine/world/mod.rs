@@ -26,8 +26,10 @@ use edit::{Slots, StandingForces, Target};
 use events::Events;
 use groups::Groups;
 use joints::JointSlots;
+use std::any::Any;
 use std::fmt;
 use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use traits::Traits;
 
 pub mod batch;
@@ -161,6 +163,13 @@ pub struct World {
     joints: JointSlots,
 }
 
+/// What a panic said.
+fn said(panic: &(dyn Any + Send)) -> String {
+    let text =
+        panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    text.unwrap_or("no message").into()
+}
+
 impl fmt::Debug for World {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("World")
@@ -240,14 +249,17 @@ impl World {
         self.features
     }
 
-    /// Advances the world by `settings.dt`. Errors: as [`Settings::check`]; a body diverged.
+    /// Advances the world by `settings.dt`. Errors: as [`Settings::check`]; a body diverged; with several threads, a panic.
     pub fn step(&mut self) -> Result<(), StepError> {
         self.settings.check().map_err(StepError::Settings)?;
         let mut clock = Clock::start(self.settings.timed);
         self.set_workers();
-        self.solve(&mut clock);
-        self.store();
-        clock.lap(Phase::Store);
+        if self.work.workers.count() > 1 {
+            let whole = AssertUnwindSafe(|| self.solve_and_store(&mut clock));
+            catch_unwind(whole).map_err(|panic| StepError::Panicked(said(&*panic)))?;
+        } else {
+            self.solve_and_store(&mut clock);
+        }
         self.step_index += 1;
         self.timings = clock.stop();
         self.end_edits();
@@ -255,6 +267,12 @@ impl World {
             self.find_events();
         }
         self.check().map_err(StepError::Diverged)
+    }
+
+    fn solve_and_store(&mut self, clock: &mut Clock) {
+        self.solve(clock);
+        self.store();
+        clock.lap(Phase::Store);
     }
 
     /// Writes velocities and displacements of the rows back to the bodies.
@@ -296,7 +314,7 @@ impl World {
                 slop: Margins::of(settings.length_unit).slop,
                 apart: &|pair| {
                     ignores(joints, filters, pair, pair.map(|i| shape_body[i as usize]))
-                        || !broadphase.around(pair[0]).contains(&pair[1])
+                        || broadphase.space_of(pair[0]) != broadphase.space_of(pair[1])
                 },
                 near: &|shape, area, visit| match broadphase {
                     BroadPhase::Spaces(spaces) => spaces.around(shape).for_each(visit),

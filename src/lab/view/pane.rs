@@ -101,6 +101,9 @@ impl Pane {
         match self.world.step() {
             Ok(()) => {}
             Err(StepError::Settings(error)) => return Err(error.into()),
+            Err(error @ StepError::Panicked(_)) => {
+                return Err(Error::invalid("threads", error.to_string()).into());
+            }
             Err(StepError::Diverged(divergence)) => {
                 self.failure = Some(divergence.into());
                 return Ok(());
