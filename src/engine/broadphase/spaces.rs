@@ -119,7 +119,7 @@ mod tests {
             let center = Vec2::from_angle(i as f32 * 0.7 + turn) * (1.0 + i as f32 * 0.03);
             let aabb = Aabb { min: center - 0.3, max: center + 0.3 };
             let aabb = if i == 3 { Aabb { min: Vec2::NAN, max: Vec2::NAN } } else { aabb };
-            Proxy { aabb, body: i, group: 0, dynamic: i % 5 != 0 }
+            Proxy { aabb, body: i, group: 0, dynamic: !i.is_multiple_of(5) }
         };
         (0..count).map(of).collect()
     }

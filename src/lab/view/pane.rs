@@ -102,7 +102,7 @@ impl Pane {
             Ok(()) => {}
             Err(StepError::Settings(error)) => return Err(error.into()),
             Err(error @ StepError::Panicked(_)) => {
-                return Err(Error::invalid("threads", error.to_string()).into());
+                return Err(Error::invalid("threads", error.to_string()));
             }
             Err(StepError::Diverged(divergence)) => {
                 self.failure = Some(divergence.into());
