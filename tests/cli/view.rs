@@ -341,3 +341,19 @@ fn a_player_in_a_real_browser() {
     );
     assert!(found["text"].as_str().unwrap().starts_with('{'), "{found}");
 }
+
+/// Prints how fast a large scene is drawn and stepped: `cargo test --release --test cli -- --ignored frames --nocapture`.
+#[test]
+#[ignore = "measures this machine"]
+fn frames_of_a_large_scene() {
+    let program = Program::start("large_pyramid --solvers soft_step,shim --patience 60");
+    let script = r#"
+        await until(() => window.page && page.state && page.state.step > 60);
+        const step = page.state.step, start = performance.now();
+        const found = [];
+        for (let i = 0; i < 8; i++) { await pause(1000); found.push(document.getElementById("clock").textContent); }
+        return { found, steps: 1000 * (page.state.step - step) / (performance.now() - start), panes: page.state.panes.map((p) => p.step_ns / 1e6) };
+    "#;
+    let Some(found) = visit(&program.address(), script) else { return };
+    println!("{found:#}");
+}
