@@ -100,6 +100,62 @@ fn the_page_is_whole_in_a_browser() {
 }
 
 #[test]
+fn rows_are_sorted_and_filtered_in_a_browser() {
+    let folder = tempfile::tempdir().unwrap();
+    study(folder.path());
+    let script = r#"
+        const table = document.querySelector("table.filtered"), [body] = table.tBodies;
+        const heads = [...table.tHead.rows[0].cells], box = document.querySelector("input.filter");
+        const column = (i) => [...body.rows].filter((r) => r.offsetParent).map((r) => r.cells[i].textContent);
+        const click = (i) => { heads[i].click(); return [column(i), heads[i].getAttribute("aria-sort")]; };
+        const filter = (words) => {
+            box.value = words; box.dispatchEvent(new Event("input"));
+            return [...body.rows].filter((r) => r.offsetParent).map((r) => r.textContent);
+        };
+        const names = heads.map((h) => h.textContent), first = column(2);
+        return { names, first, columns: names.map((_, i) => [column(i), click(i), click(i)]),
+            marked: heads.filter((h) => h.hasAttribute("aria-sort")).length,
+            some: filter("shim  ARCH house"), none: filter("shim no-such-word"), some2: filter("house shim"), all: filter("").length };
+    "#;
+    let Some(found) = drive(&folder.path().join("r/report.html"), "", script) else { return };
+    let strings = |v: &serde_json::Value| -> Vec<String> { serde_json::from_value(v.clone()).unwrap() };
+    let rows = strings(&found["first"]).len();
+    assert_eq!(rows, 3 * 7, "{found}");
+    // Numbers with prefixes by value, and rows without a number last.
+    let number = |text: &str| -> Option<f64> {
+        let end = text.find(|c: char| !c.is_ascii_digit() && !"-.e".contains(c)).unwrap_or(text.len());
+        let scale = match text[end..].trim() {
+            "mm" | "mm/s" => 1e-3,
+            "µm" | "µm/s" => 1e-6,
+            "nm" | "nm/s" => 1e-9,
+            _ => 1.0,
+        };
+        text[..end].parse().ok().map(|x: f64| x * scale)
+    };
+    for (name, column) in strings(&found["names"]).iter().zip(found["columns"].as_array().unwrap()) {
+        let [up, down] = [1, 2].map(|k| strings(&column[k][0]));
+        assert_eq!((&column[1][1], &column[2][1]), (&json!("ascending"), &json!("descending")), "{name}");
+        for (rows, sign) in [(&up, 1.0), (&down, -1.0)] {
+            let mut same = [rows.clone(), strings(&column[0])];
+            same.iter_mut().for_each(|rows| rows.sort());
+            assert_eq!(same[0], same[1], "{name}");
+            let is_sorted = match name.as_str() {
+                "kind" | "scene" | "solver" => {
+                    rows.is_sorted_by(|a, b| if sign > 0.0 { a <= b } else { a >= b })
+                }
+                "setting" | "verdict" => rows != &strings(&column[0]),
+                _ => rows.is_sorted_by_key(|text| number(text).map_or(f64::INFINITY, |x| sign * x)),
+            };
+            assert!(is_sorted, "{name}: {rows:?}");
+        }
+    }
+    assert_eq!((&found["marked"], &found["all"]), (&json!(1), &json!(rows)), "{found}");
+    assert_eq!((strings(&found["some"]).len(), strings(&found["none"]).len()), (0, 0), "{found}");
+    let some = strings(&found["some2"]);
+    assert!(some.len() == 1 && some[0].contains("card_house") && some[0].contains("shim"), "{some:?}");
+}
+
+#[test]
 fn errors_of_pairs_and_times_make_the_study_and_its_figures() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();

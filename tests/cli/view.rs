@@ -291,7 +291,8 @@ fn a_player_in_a_real_browser() {
             for (let i = 0; i < d.length; i += 4) sum += [0xd3, 0xd8, 0xde].every((v, k) => Math.abs(d[i + k] - v) <= 2);
             return sum;
         };
-        const out = { ground: Math.min(color(left), color(right)), start: body(0, 4) };
+        const shown = (id) => get(id).offsetParent !== null;
+        const out = { ground: Math.min(color(left), color(right)), start: body(0, 4), no_joints: shown("hands") && !shown("scissors") };
         event("pointerdown", out.start, 1);
         await until(() => page.state.held);
         const goal = [out.start[0] + 3, out.start[1] + 1];
@@ -327,7 +328,7 @@ fn a_player_in_a_real_browser() {
         return out;
     "#;
     let Some(found) = visit(&program.address(), script) else { return };
-    for name in ["panned", "dropped", "stepped", "recorded", "setting", "offline"] {
+    for name in ["no_joints", "panned", "dropped", "stepped", "recorded", "setting", "offline"] {
         assert_eq!(found[name], true, "{name}: {found}");
     }
     let number = |v: &Value| v.as_f64().unwrap();
@@ -340,4 +341,20 @@ fn a_player_in_a_real_browser() {
         "{found}"
     );
     assert!(found["text"].as_str().unwrap().starts_with('{'), "{found}");
+}
+
+/// Prints how fast a large scene is drawn and stepped: `cargo test --release --test cli -- --ignored frames --nocapture`.
+#[test]
+#[ignore = "measures this machine"]
+fn frames_of_a_large_scene() {
+    let program = Program::start("large_pyramid --solvers soft_step,shim --patience 60");
+    let script = r#"
+        await until(() => window.page && page.state && page.state.step > 60);
+        const step = page.state.step, start = performance.now();
+        const found = [];
+        for (let i = 0; i < 8; i++) { await pause(1000); found.push(document.getElementById("clock").textContent); }
+        return { found, steps: 1000 * (page.state.step - step) / (performance.now() - start), panes: page.state.panes.map((p) => p.step_ns / 1e6) };
+    "#;
+    let Some(found) = visit(&program.address(), script) else { return };
+    println!("{found:#}");
 }

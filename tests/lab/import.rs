@@ -23,14 +23,16 @@ const RUBE: &str = r#"{
   {"sensor": true, "circle": {"center": 0, "radius": 3}}]},
  {"name": "weight", "type": 2, "position": {"x": 20, "y": 3}, "fixedRotation": true, "bullet": true, "fixture": [
   {"density": 2, "restitution": 0.5, "polygon": {"vertices": {"x": [0.2, 0, -0.2], "y": [0, 0.4, 0]}}}]},
- {"name": "ceiling", "type": 0, "position": {"x": 20, "y": 6}}],
+ {"name": "ceiling", "type": 0, "position": {"x": 20, "y": 6}},
+ {"name": "off", "type": 2, "active": false, "position": {"x": 9, "y": 9}, "fixture": [{"circle": {"center": 0, "radius": 1}}]}],
 "joint": [
  {"type": "wheel", "bodyA": 1, "bodyB": 2, "anchorA": {"x": -0.7, "y": -0.4}, "anchorB": 0, "localAxisA": {"x": 0, "y": 1},
   "enableMotor": true, "motorSpeed": -6, "maxMotorTorque": 8, "springFrequency": 4, "springDampingRatio": 0.7},
  {"type": "revolute", "bodyA": 1, "bodyB": 3, "anchorA": {"x": 0.7, "y": -0.4}, "anchorB": 0, "refAngle": 0},
  {"type": "rope", "bodyA": 5, "bodyB": 4, "anchorA": 0, "anchorB": {"x": 0, "y": 0.4}, "maxLength": 2.5},
+ {"type": "distance", "bodyA": 5, "bodyB": 6, "anchorA": 0, "anchorB": 0, "length": 3, "frequency": 0, "dampingRatio": 0},
  {"type": "gear", "bodyA": 2, "bodyB": 3, "joint1": 0, "joint2": 1, "ratio": 1}],
-"image": [{"file": "cart.png"}]}"#;
+"image": [{"file": "cart.png"}, {"file": "wheel.png", "customProperties": [{"name": "layer", "int": 1}]}]}"#;
 
 /// As the serializer of planck.js writes: a list whose entries refer to each other.
 const PLANCK: &str = r#"[
@@ -45,6 +47,15 @@ const PLANCK: &str = r#"[
  "enableLimit": true, "lowerAngle": -1, "upperAngle": 0.25, "localAnchorA": {"x": 0, "y": 0},
  "localAnchorB": {"x": -1, "y": 0}, "referenceAngle": 0.5}]"#;
 
+const LEFT_OUT: [&str; 6] = [
+    "bodies that are not active (1)",
+    "custom properties (1)",
+    "images (2)",
+    "joints of bodies that are not active (1)",
+    "joints of kind gear (1)",
+    "sensors (1)",
+];
+
 fn run(scene: &Scene) -> World {
     let mut world = scene.build(Settings::default()).unwrap();
     (0..200).for_each(|_| world.step().unwrap());
@@ -55,9 +66,9 @@ fn run(scene: &Scene) -> World {
 fn a_scene_of_rube_is_read_and_runs() {
     let scene = Scene::from_json(RUBE, "cart.json".as_ref()).unwrap();
     assert_eq!((scene.name.as_str(), scene.gravity, scene.dt), ("cart", [0.0, -10.0], 0.02));
-    assert_eq!(scene.left_out, ["images (1)", "joints of kind gear (1)", "sensors (1)"]);
+    assert_eq!(scene.left_out, LEFT_OUT);
     let kinds: Vec<_> = scene.bodies.iter().map(|body| body.kind == BodyKind::Dynamic).collect();
-    assert_eq!(kinds, [false, true, true, true, true, false]);
+    assert_eq!(kinds, [false, true, true, true, true, false, false]);
     assert!(matches!(scene.bodies[0].shapes[..], [_, _]), "two pieces of a chain");
     let cart = &scene.bodies[1];
     // Box2D's inertia is about the origin: 1.03 = 1 + 3 · 0.1².
@@ -85,6 +96,28 @@ fn a_scene_of_planck_is_read_and_runs() {
     // It swings down to its limit: 1 rad below the angle that counts as zero.
     let [x, y] = world.bodies.origin(1);
     assert!((x - 0.5_f64.cos()).abs() < 0.02 && (y - 4.0 + 0.5_f64.sin()).abs() < 0.02, "[{x}, {y}]");
+}
+
+/// R.U.B.E. writes the anchor of a mouse joint as a point of the world; planck.js one of the body, under a name of its own.
+#[test]
+fn a_mouse_holds_the_same_point_in_both_notations() {
+    let rube = r#"{"gravity": 0, "body": [{"type": 0}, {"type": 2, "position": {"x": 1, "y": 2}, "angle": 0.5,
+        "fixture": [{"density": 1, "circle": {"center": 0, "radius": 1}}]}], "joint": [{"type": "mouse", "bodyA": 0, "bodyB": 1,
+        "target": {"x": 3, "y": 2}, "anchorB": {"x": 1.4, "y": 2.3}, "maxForce": 50, "frequency": 5, "dampingRatio": 0.7}]}"#;
+    let planck = r#"[{"gravity": {"x": 0, "y": 0}, "bodies": [{"refIndex": 1, "refType": "Body"}, {"refIndex": 2, "refType": "Body"}],
+        "joints": [{"refIndex": 3, "refType": "Joint"}]}, {"type": "static", "fixtures": []},
+        {"type": "dynamic", "position": {"x": 1, "y": 2}, "angle": 0.5, "fixtures": [{"refIndex": 4, "refType": "Fixture"}]},
+        {"type": "mouse-joint", "bodyA": {"refIndex": 1, "refType": "Body"}, "bodyB": {"refIndex": 2, "refType": "Body"},
+        "target": {"x": 3, "y": 2}, "maxForce": 50, "frequencyHz": 5, "dampingRatio": 0.7, "_localAnchorB": {"x": 0.494861, "y": 0.071504}},
+        {"density": 1, "shape": {"type": "circle", "p": {"x": 0, "y": 0}, "radius": 1}}]"#;
+    for text in [rube, planck] {
+        let scene = Scene::from_json(text, "mouse.json".as_ref()).unwrap();
+        let JointKind::Mouse(mouse) = &scene.joints[0].kind else { panic!("{:?}", scene.joints[0]) };
+        // (0.4, 0.3) turned back by 0.5 rad.
+        let [x, y] = mouse.anchor_b;
+        assert!((x - 0.494861).abs() < 1e-6 && (y - 0.071504).abs() < 1e-6, "[{x}, {y}]");
+        assert_eq!((mouse.target, mouse.max_force, mouse.spring.hertz), ([3.0, 2.0], 50.0, 5.0));
+    }
 }
 
 #[test]

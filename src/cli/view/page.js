@@ -158,8 +158,7 @@
     const box = (i) => ({ left, right, top: i * row + 17, bottom: (i + 1) * row - 3 });
     CURVES.forEach(([name, unit], i) => {
       const limit = scaled(i, stage.limits[i]), [low, high] = ranges[i];
-      const shown = (v) => (unit === "%" ? `${v < 0.001 ? v.toExponential(0).replace("-", "−") : Number(v.toPrecision(2))} %` : si(v, unit));
-      const text = shown(last.values[i]) + (limit ? `, limit ${shown(limit)}` : "");
+      const text = si(last.values[i], unit) + (limit ? `, limit ${si(limit, unit)}` : "");
       const line = history.map((p) => [across(p.step), p.values[i]]);
       drawing.strip(c, box(i), { name, text, color, low, high, line, mark: null, limit });
     });

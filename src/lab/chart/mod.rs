@@ -569,6 +569,46 @@ mod tests {
         assert!(!chart(FailStrip::None).svg().contains(">\nfails\n"));
     }
 
+    /// Widths of texts in DejaVu Sans at the size of labels, as a browser measures them (pixels).
+    const MEASURED: [(&str, f64); 12] = [
+        ("pgs", 20.2),
+        ("pgs_ngs_block", 81.6),
+        ("soft_step 12 of 14", 101.4),
+        ("tgs_ngs", 43.3),
+        ("@×·µs,", 41.0),
+        ("WMWMW", 52.9),
+        ("jacobi, xpbd", 68.8),
+        ("4 × (1 + 1)", 63.6),
+        ("1234567890", 71.8),
+        ("nncg", 27.7),
+        ("illijt(f)", 32.9),
+        ("−1.5e−3 %", 65.3),
+    ];
+
+    #[test]
+    fn labels_of_close_marks_do_not_touch() {
+        for (name, width) in MEASURED {
+            assert!(f64::from(width_of(name)) >= width, "{name}: {} < {width}", width_of(name));
+        }
+        let chart = Chart { size: [900, 500], ..chart(FailStrip::Right) };
+        let frame = PlotFrame { chart: &chart, left: LEFT, right: 852, top: 30, bottom: 452 };
+        let (mut labels, mut placed) = (Labels::default(), Vec::new());
+        let marks: Vec<Pixel> = (0..40).map(|i| (400 + i * 7 % 30, 200 + i * 11 % 24)).collect();
+        marks.iter().for_each(|&mark| labels.block(mark, 4));
+        for (&mark, (name, width)) in marks.iter().zip(MEASURED.iter().cycle()) {
+            let place = labels.place(mark, 4, name, &frame);
+            placed.extend(place.map(|((x, y), _)| (f64::from(x), y, *width)));
+        }
+        assert!(placed.len() >= 12, "{}", placed.len());
+        for (i, (x, y, width)) in placed.iter().enumerate() {
+            let is_apart = |(u, v, other): &(f64, i32, f64)| {
+                (y - v).abs() >= LABEL || x + width <= *u || u + other <= *x
+            };
+            assert!(placed[..i].iter().all(is_apart), "{placed:?}");
+            assert!(*x >= 72.0 && x + width <= 852.0, "{placed:?}");
+        }
+    }
+
     #[test]
     fn a_file_holds_all_charts_and_follows_the_page() {
         let rows = [

@@ -237,7 +237,7 @@ fn legend(
         drawing.group("linearGradient id=\"ramp\"", &RAMP.iter().enumerate().map(stop).collect::<String>());
         drawing.rectangle([x, y - 7.0], [wide, 14.0], "url(#ramp)");
         let more = if deepest > darkest { "≥ " } else { "" };
-        text(drawing, [x, -14.0], "start", "penetration");
+        text(drawing, [x, -14.0], "start", "overlap");
         text(drawing, [x, 24.0], "start", "0");
         text(drawing, [x + wide, 24.0], "end", &format!("{more}{}", si_short(darkest, "m")));
     }
@@ -285,13 +285,12 @@ mod tests {
         assert_eq!((count("<title>body"), count("along the normal")), (4, 6), "{text}");
         // An arrow at each of six points, and one in the legend.
         assert_eq!(count(&format!("fill=\"{}\"", hex(IMPULSE))), 7, "{text}");
-        for part in ["stack:3", "below", "penetration", "N·s", "over the step", "contact and normal", " mm<"]
-        {
+        for part in ["stack:3", "below", ">overlap<", "N·s", "over the step", "contact and normal", " mm<"] {
             assert!(text.contains(part), "{part}");
         }
         assert!(!text.contains("NaN") && !text.contains("inf"));
         let none = frame("bounce", 1);
-        assert!(!none.contains("penetration") && !none.contains("over the step"), "{none}");
+        assert!(!none.contains(">overlap<") && !none.contains("over the step"), "{none}");
     }
 
     #[test]

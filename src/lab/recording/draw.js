@@ -34,6 +34,7 @@ const drawing = (() => {
 
   const si = (value, unit) => {
     if (!(Math.abs(value) > 0)) return `0 ${unit}`;
+    if (unit === "%") return `${value < 0.001 ? value.toExponential(0).replace("-", "−") : Number(value.toPrecision(2))} %`;
     if (!unit) return value.toExponential(1).replace("e+", "e").replace("-", "−");
     const [scale, prefix] = PREFIXES.find(([s]) => Math.abs(value) >= 0.9995 * s) || PREFIXES[PREFIXES.length - 1];
     return `${(value / scale).toPrecision(3)} ${prefix}${unit}`;
@@ -346,9 +347,11 @@ const drawing = (() => {
     c.fill();
   }
 
-  // Texts above a strip, at its left and its right.
+  // Texts above a strip, at its left and its right. Without room, what is in parentheses at the end of a name goes.
   function label(c, { left, top, right }, name, text) {
     c.fillStyle = theme().ink;
+    const width = (words) => c.measureText(words).width;
+    if (width(name) + width(text) > right - left - 8) name = name.replace(/ \(.*\)$/, "");
     c.textAlign = "left";
     c.fillText(name, left, top - 4);
     c.textAlign = "right";

@@ -71,7 +71,7 @@ impl Recorder {
             shapes: stage.shapes.iter().map(shape).collect(),
             joints: stage.joints.clone(),
             contacts,
-            curves: [["penetration", "m"], ["law residual", ""], ["speed", "m/s"]]
+            curves: [["overlap", "m"], ["force error (% of a body's weight)", "%"], ["speed", "m/s"]]
                 .map(|c| c.map(String::from))
                 .into(),
         };
@@ -101,7 +101,10 @@ impl Recorder {
         self.meter.observe(world);
         let errors = self.meter.errors();
         self.meter = Observation::new(world);
-        self.frame(world, [errors.penetration_max(), errors.law_rms_body(), errors.rest_velocity()]);
+        self.frame(
+            world,
+            [errors.penetration_max(), 100.0 * errors.law_rms_lighter(), errors.rest_velocity()],
+        );
         if self.count > LARGEST {
             let message =
                 format!("{LARGEST} numbers by step {}; record fewer frames with --every", self.steps);

@@ -93,7 +93,7 @@
     };
     if (recordings.some((r) => r.contacts)) {
       option("impulses", "forces");
-      option(`penetration (to ${si(all.deepest, "m")})`, "depths");
+      option(`overlap (to ${si(all.deepest, "m")})`, "depths");
     }
     const used = Object.keys(MARKS).filter((mark) => recordings.some((r) => r.joints.some((j) => j.mark === mark)));
     if (used.length) option(`joints (${used.map((mark) => MARKS[mark]).join(", ")})`, "joints");

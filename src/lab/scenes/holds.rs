@@ -195,13 +195,14 @@ impl SceneMonitor {
         let through = || {
             let paths = self.previous.iter().zip(&now).enumerate();
             let mut paths = paths.filter(|(i, _)| world.bodies.is_dynamic(*i));
-            let through = paths.find(|(_, (from, to))| {
+            let through = paths.find(|(i, (from, to))| {
                 let (from, to) = (**from, **to);
-                self.walls.are_crossed(from, to)
+                let stops = |wall: u32| is_stopped(world, *i, wall);
+                self.walls.are_crossed(from, to, stops)
                     || self
                         .moving
                         .iter()
-                        .any(|m| m.walls.are_crossed(m.last.inside(from), m.pose(world).inside(to)))
+                        .any(|m| m.walls.are_crossed(m.last.inside(from), m.pose(world).inside(to), stops))
             });
             through.map(|(i, _)| (Mark::Tunneled, Some(i)))
         };
@@ -272,11 +273,20 @@ pub(in crate::lab) fn energies(world: &World) -> [f64; 2] {
     })
 }
 
+/// Whether a shape stops a body: not if a joint, groups or filters keep them apart.
+fn is_stopped(world: &World, body: usize, wall: u32) -> bool {
+    let (bodies, of) = (&world.bodies, world.shape_body());
+    let group = bodies.group(body);
+    let shares_group = group != 0 && group == bodies.group(of[wall as usize] as usize);
+    let mut own = (0..of.len() as u32).filter(|&s| of[s as usize] as usize == body);
+    !shares_group && own.any(|s| !world.keeps_apart([wall, s]))
+}
+
 /// Outlines of all static shapes, or of one kinematic body.
 #[derive(Clone, Debug, Default)]
 struct Walls {
-    /// Both ends of each edge (m), sorted by the lower end.
-    edges: Vec<[DVec2; 2]>,
+    /// Both ends of each edge (m) and its shape, sorted by the lower end.
+    edges: Vec<([DVec2; 2], u32)>,
     /// Highest end of this edge and all before it (m).
     highest: Vec<f64>,
 }
@@ -289,7 +299,7 @@ impl Walls {
     fn of(world: &World, one: Option<usize>) -> Self {
         let bodies = &world.bodies;
         let mut edges = Vec::new();
-        for (shape, &body) in world.shapes().iter().zip(world.shape_body()) {
+        for (s, (shape, &body)) in world.shapes().iter().zip(world.shape_body()).enumerate() {
             let i = body as usize;
             if one.map_or(bodies.kind(i) != BodyKind::Static, |own| own != i) {
                 continue;
@@ -306,25 +316,25 @@ impl Walls {
             let ends = corners.iter().zip(corners.iter().cycle().skip(1));
             // A line of two corners is one edge.
             let count = if corners.len() == 2 { 1 } else { corners.len() };
-            edges.extend(ends.take(count).map(|(&a, &b)| [a, b]));
+            edges.extend(ends.take(count).map(|(&a, &b)| ([a, b], s as u32)));
         }
-        edges.sort_by(|a, b| a[0].y.min(a[1].y).total_cmp(&b[0].y.min(b[1].y)));
-        let highest = edges.iter().scan(f64::NEG_INFINITY, |highest, e| {
+        edges.sort_by(|(a, _), (b, _)| a[0].y.min(a[1].y).total_cmp(&b[0].y.min(b[1].y)));
+        let highest = edges.iter().scan(f64::NEG_INFINITY, |highest, (e, _)| {
             *highest = highest.max(e[0].y).max(e[1].y);
             Some(*highest)
         });
         Walls { highest: highest.collect(), edges }
     }
 
-    /// Whether the straight path from one point to another crosses an outline.
-    fn are_crossed(&self, from: DVec2, to: DVec2) -> bool {
+    /// Whether the straight path from one point to another crosses the outline of a shape that stops it.
+    fn are_crossed(&self, from: DVec2, to: DVec2, stops: impl Fn(u32) -> bool) -> bool {
         let (low, high) = (from.y.min(to.y), from.y.max(to.y));
-        let begun = self.edges.partition_point(|e| e[0].y.min(e[1].y) <= high);
+        let begun = self.edges.partition_point(|(e, _)| e[0].y.min(e[1].y) <= high);
         let reaching = self.edges[..begun].iter().zip(&self.highest).rev().take_while(|(_, h)| **h >= low);
-        reaching.into_iter().any(|(&[a, b], _)| {
+        reaching.into_iter().any(|(&([a, b], shape), _)| {
             // Side of the line through p and q on which a point lies.
             let side = |p: DVec2, q: DVec2, point: DVec2| (q - p).perp_dot(point - p) > 0.0;
-            side(a, b, from) != side(a, b, to) && side(from, to, a) != side(from, to, b)
+            side(a, b, from) != side(a, b, to) && side(from, to, a) != side(from, to, b) && stops(shape)
         })
     }
 }
@@ -382,9 +392,11 @@ impl MovingWalls {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::bodies::Filter;
+    use crate::engine::joints::JointKind;
     use crate::engine::solvers::{DEFAULT, find};
     use crate::engine::world::Settings;
-    use crate::lab::scenes::{Scene, SceneBody, SceneShape, load};
+    use crate::lab::scenes::{Scene, SceneBody, SceneJoint, SceneShape, load};
 
     fn build(scene: &Scene) -> World {
         scene.build(Settings::new(find(DEFAULT).unwrap())).unwrap()
@@ -459,10 +471,31 @@ mod tests {
         ];
         let walls = Walls::of(&build(&Scene::new("x", yard)), None);
         assert_eq!(walls.edges.len(), 4 + 1 + DISC_EDGES);
-        let crossed = |a: [f64; 2], b: [f64; 2]| walls.are_crossed(a.into(), b.into());
+        let crossed = |a: [f64; 2], b: [f64; 2]| walls.are_crossed(a.into(), b.into(), |_| true);
         assert!(crossed([0.0, 1.5], [0.0, 0.5]) && crossed([-9.0, 0.0], [9.0, 0.1]));
         assert!(crossed([4.0, 11.0], [4.0, 9.0]) && !crossed([6.0, 11.0], [6.0, 9.0]));
         assert!(crossed([23.0, 0.1], [21.0, 0.1]) && !crossed([-2.0, 2.0], [2.0, 2.0]));
+    }
+
+    #[test]
+    fn what_does_not_collide_with_a_wall_may_pass_it() {
+        let passes = |filter: Filter, group: i32, joint: Option<SceneJoint>| {
+            let wall = SceneShape { filter, ..SceneShape::rectangle(0.5, 5.0) };
+            let wall = SceneBody { group, ..SceneBody::fixed([0.0, 0.0], wall) };
+            let ball = SceneBody { group: 7, ..SceneBody::dynamic([2.0, 0.0], SceneShape::disc(0.1)) };
+            let scene = Scene { joints: joint.into_iter().collect(), ..Scene::new("x", vec![wall, ball]) };
+            let mut world = build(&scene);
+            let mut watch = SceneMonitor::new(&world, []);
+            world.bodies.position_x[1] = -2.0;
+            watch.observe(&world);
+            watch.broken().is_none()
+        };
+        let hinge = SceneJoint::new(0, 1, JointKind::Filter);
+        let both = Filter::default();
+        assert!(!passes(both, 0, None) && !passes(both, 3, None));
+        assert!(passes(Filter { mask: !1, ..both }, 0, None), "filter");
+        assert!(passes(both, 7, None), "group");
+        assert!(passes(both, 0, Some(hinge)), "joint");
     }
 
     #[test]

@@ -12,6 +12,7 @@ use crate::engine::joints::{Distance, JointKind, Motor, Mouse, Prismatic, Revolu
 use crate::engine::params::{DEFAULT_DENSITY, DEFAULT_DT};
 use crate::engine::shapes::{MassProperties, combine};
 use crate::lab::error::Error;
+use glam::DVec2;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -120,6 +121,12 @@ impl LeftOut {
     fn add(&mut self, what: impl Into<String>) {
         *self.0.entry(what.into()).or_default() += 1;
     }
+
+    /// What the author of a file noted about a part of it.
+    fn properties(&mut self, part: &Node<'_>) -> Result<(), Error> {
+        part.list(&["customProperties"])?.iter().for_each(|_| self.add("custom properties"));
+        Ok(())
+    }
 }
 
 /// Reads a scene of another program. Errors: a value of another type than its name requires, with its place; no
@@ -133,11 +140,11 @@ pub(super) fn scene(file: &Value, name: &str) -> Result<Scene, Error> {
     for node in root.list(&["joint", "joints"])? {
         joints.extend(joint(&node, &nodes, &bodies, &mut left_out)?);
     }
-    for (key, what) in [("image", "images"), ("customProperties", "custom properties")] {
-        if root.get(&[key]).is_some_and(|node| node.value.as_array().is_some_and(|list| !list.is_empty())) {
-            left_out.add(what);
-        }
+    for image in root.list(&["image"])? {
+        left_out.add("images");
+        left_out.properties(&image)?;
     }
+    left_out.properties(&root)?;
     let rate = root.real(&["stepsPerSecond"], 0.0)?;
     Ok(Scene {
         gravity: root.vector(&["gravity"], [0.0; 2])?,
@@ -148,6 +155,10 @@ pub(super) fn scene(file: &Value, name: &str) -> Result<Scene, Error> {
     })
 }
 
+fn is_active(body: &Node<'_>) -> bool {
+    body.get(&["active"]).is_none_or(|active| active.value.as_bool() != Some(false))
+}
+
 fn body(node: &Node<'_>, left_out: &mut LeftOut) -> Result<SceneBody, Error> {
     let kind = match node.get(&["type"]).map(|kind| kind.value.clone()) {
         Some(Value::String(kind)) if kind == "dynamic" => BodyKind::Dynamic,
@@ -156,12 +167,16 @@ fn body(node: &Node<'_>, left_out: &mut LeftOut) -> Result<SceneBody, Error> {
         Some(Value::Number(kind)) if kind.as_i64() == Some(1) => BodyKind::Kinematic,
         _ => BodyKind::Static,
     };
-    let is_active = node.get(&["active"]).is_none_or(|active| active.value.as_bool() != Some(false));
+    let is_active = is_active(node);
+    // Nothing moves a body that is not active.
+    let kind = if is_active { kind } else { BodyKind::Static };
+    left_out.properties(node)?;
     if !is_active {
         left_out.add("bodies that are not active");
     }
     let (mut shapes, mut masses, mut groups) = (Vec::new(), Vec::new(), Vec::new());
     for fixture in node.list(&["fixture", "fixtures"])?.iter().filter(|_| is_active) {
+        left_out.properties(fixture)?;
         if fixture.flag(&["sensor", "isSensor"]) {
             left_out.add("sensors");
             continue;
@@ -272,6 +287,7 @@ fn joint(
     bodies: &[SceneBody],
     left_out: &mut LeftOut,
 ) -> Result<Option<SceneJoint>, Error> {
+    left_out.properties(node)?;
     let kind = node.value.get("type").and_then(Value::as_str).unwrap_or("unknown");
     let kind = kind.trim_end_matches("-joint");
     let end = |name: &str| {
@@ -281,6 +297,7 @@ fn joint(
         let index = found.or_else(|| of.value.as_u64().map(|index| index as usize));
         index.filter(|&index| index < bodies.len()).map_or_else(|| of.refuse("a body of the file"), Ok)
     };
+    let [a, b] = [end("bodyA")?, end("bodyB")?];
     let zero = [0.0; 2];
     let anchor_a = node.vector(&["anchorA", "localAnchorA"], zero)?;
     let anchor_b = node.vector(&["anchorB", "localAnchorB"], zero)?;
@@ -327,6 +344,13 @@ fn joint(
         }
         "mouse" => {
             let target = node.vector(&["target"], zero)?;
+            let anchor_b = match node.get(&["anchorB"]) {
+                // Of all anchors, only this one is a point of the world.
+                Some(_) => DVec2::from_angle(-bodies[b].angle)
+                    .rotate(DVec2::from(anchor_b) - DVec2::from(bodies[b].position))
+                    .to_array(),
+                None => node.vector(&["_localAnchorB"], anchor_b)?,
+            };
             JointKind::Mouse(Mouse { target, anchor_b, spring, max_force: node.real(&["maxForce"], 0.0)? })
         }
         other => {
@@ -334,7 +358,10 @@ fn joint(
             return Ok(None);
         }
     };
-    let [a, b] = [end("bodyA")?, end("bodyB")?];
+    if ![a, b].iter().all(|&body| is_active(&nodes[body])) {
+        left_out.add("joints of bodies that are not active");
+        return Ok(None);
+    }
     if [a, b].iter().all(|&body| bodies[body].kind != BodyKind::Dynamic) {
         left_out.add("joints between bodies that are not dynamic");
         return Ok(None);

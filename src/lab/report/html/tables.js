@@ -8,10 +8,11 @@
     const found = /^(-?[\d.]+(?:e-?\d+)?)\s*([GMkmµnp](?=[a-zA-Z]))?/.exec(text);
     return found ? Number(found[1]) * (SCALE[found[2]] || 1) : text;
   };
-  const compare = (a, b) => {
+  // Numbers come before texts, in both directions.
+  const compare = (a, b, sign) => {
     const kinds = [typeof a, typeof b];
     if (kinds[0] !== kinds[1]) return kinds[0] === "number" ? -1 : 1;
-    return kinds[0] === "number" ? a - b : a.localeCompare(b);
+    return sign * (kinds[0] === "number" ? a - b : a.localeCompare(b));
   };
   for (const table of document.querySelectorAll("table.numbers")) {
     const [body] = table.tBodies;
@@ -25,7 +26,7 @@
         heads.forEach((other) => other.removeAttribute("aria-sort"));
         head.setAttribute("aria-sort", down ? "descending" : "ascending");
         const keyed = [...body.rows].map((row) => [value(row.cells[i].textContent.trim()), row]);
-        keyed.sort(([a], [b]) => (down ? -1 : 1) * compare(a, b));
+        keyed.sort(([a], [b]) => compare(a, b, down ? -1 : 1));
         body.append(...keyed.map(([, row]) => row));
       };
       head.addEventListener("click", sort);
