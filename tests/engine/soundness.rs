@@ -496,6 +496,7 @@ fn unsafe_code_is_only_in_listed_files() {
         "src/engine/lanes/shared.rs",
         "src/engine/narrowphase/batch.rs",
         "src/engine/workers.rs",
+        "src/engine/world/groups.rs",
         "tests/allocations.rs",
         "tests/lab/flush_to_zero.rs",
     ];

@@ -116,7 +116,7 @@ mod tests {
     /// Boxes on a spiral; every fifth is static, one is removed.
     fn proxies(count: u32, turn: f32) -> Vec<Proxy> {
         let of = |i: u32| {
-            let center = Vec2::from_angle(i as f32 * 0.7 + turn) * (1.0 + i as f32 * 0.03);
+            let center = Vec2::from_angle(i as f32 * 0.4 + turn) * (1.0 + i as f32 * 0.03);
             let aabb = Aabb { min: center - 0.3, max: center + 0.3 };
             let aabb = if i == 3 { Aabb { min: Vec2::NAN, max: Vec2::NAN } } else { aabb };
             Proxy { aabb, body: i, group: 0, dynamic: !i.is_multiple_of(5) }

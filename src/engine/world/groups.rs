@@ -42,6 +42,8 @@ pub(super) struct Groups {
     list: Vec<Group>,
     /// One for each thread.
     seats: Vec<Seat>,
+    /// Widths, features and size that the lanes of `list` were assigned for.
+    lanes_are_for: Option<([LaneWidth; 2], Features, usize)>,
     /// Number of groups of the last step; 0 if it was solved as a whole.
     count: usize,
     islands: DisjointSets,
@@ -133,7 +135,7 @@ impl Groups {
             weights[islands.least(body) as usize] += 1;
         }
         let (all, largest) = (weights.iter().sum::<u32>(), weights.iter().copied().max().unwrap_or(0));
-        let room = size as u32 * CONTACT;
+        let room = u32::try_from(size).unwrap_or(u32::MAX).saturating_mul(CONTACT);
         if 2 * largest > all || (all / room) < least as u32 {
             return false;
         }
@@ -184,10 +186,10 @@ impl Groups {
     }
 
     /// Assigns the lanes of every group, except where they would be those of the last step.
-    fn assign(&mut self, widths: [LaneWidth; 2], features: &Features, is_new: bool, workers: &Workers) {
+    fn assign(&mut self, widths: [LaneWidth; 2], features: &Features, workers: &Workers) {
         self.seats.resize_with(workers.count(), Seat::default);
         each(&mut self.list[..self.count], &mut self.seats, workers, |group, seat| {
-            if is_new || !group.is_as_before() {
+            if !group.is_as_before() {
                 group.assign(widths, features, seat);
             }
         });
@@ -314,14 +316,19 @@ impl Group {
 }
 
 impl World {
-    /// Divides the step into groups if that pays, and assigns their lanes. `is_new`: solver, widths or features changed.
-    pub(super) fn group_islands(&mut self, features: &Features, is_new: bool) -> bool {
+    /// Divides the step into groups if that pays, and assigns their lanes.
+    pub(super) fn group_islands(&mut self, features: &Features) -> bool {
         let World { groups, settings, bodies, contacts, work, .. } = self;
+        let choice = Some((settings.widths(), *features, settings.group_size));
+        if groups.lanes_are_for != choice {
+            groups.list.clear();
+            groups.lanes_are_for = choice;
+        }
         let least = if work.workers.count() > 1 { LEAST_SHARED } else { LEAST_ALONE };
         if !groups.divide([settings.group_size, least], &bodies.kind, contacts) {
             return false;
         }
-        groups.assign(settings.widths(), features, is_new, &work.workers);
+        groups.assign(settings.widths(), features, &work.workers);
         let of = groups.in_use();
         let slots = |group: &Group| group.lanes.lanes() + group.serial.lanes();
         self.counts.colors = of.iter().map(|group| group.assignment.colors).max().unwrap_or(0);

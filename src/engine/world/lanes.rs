@@ -11,12 +11,11 @@ impl World {
         let widths = self.settings.widths();
         let group_size = self.group_size();
         let choice = Some((self.solver_is.name, widths, self.settings.order, *features, group_size));
-        let is_new = self.lanes_are_for != choice;
-        if !self.narrow.is_changed && !is_new {
+        if !self.narrow.is_changed && self.lanes_are_for == choice {
             return;
         }
         (self.narrow.is_changed, self.lanes_are_for) = (false, choice);
-        if group_size > 0 && self.group_islands(features, is_new) {
+        if group_size > 0 && self.group_islands(features) {
             return;
         }
         self.groups.leave();
