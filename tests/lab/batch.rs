@@ -34,8 +34,8 @@ fn batch(settings: Settings, copies: usize) -> Batch {
 #[test]
 fn a_copy_has_the_bits_that_it_has_alone() {
     for variant in VARIANTS.iter().filter(|variant| variant.is_local) {
-        for group_size in [0, 1] {
-            let settings = || Settings { group_size, ..Settings::new(variant) };
+        for (group_size, threads) in [(0, 1), (1, 2)] {
+            let settings = || Settings { group_size, threads, ..Settings::new(variant) };
             let mut all = batch(settings(), 24);
             let mut alone: Vec<World> = (0..24).map(|copy| fall(copy).build(settings()).unwrap()).collect();
             all.set_gravity(5, [1.0, -3.0]).unwrap();
@@ -52,6 +52,38 @@ fn a_copy_has_the_bits_that_it_has_alone() {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn copies_in_several_worlds_are_numbered_through() {
+    // More than one world has room for, of which the last is not full.
+    let count = 1100;
+    for threads in [1, 2] {
+        let settings = Settings { threads, ..Settings::new(solvers::SOFT_STEP) };
+        let mut all = batch(settings.clone(), count);
+        assert!(!std::ptr::eq(all.world_of(0).0, all.world_of(count - 1).0));
+        all.set_gravity(1000, [3.0, -1.0]).unwrap();
+        for step in 0..30 {
+            if step == 10 {
+                all.reset(700);
+            }
+            all.step().unwrap();
+        }
+        let alone = |copy: usize, steps: u32| {
+            let mut world = fall(copy).build(settings.clone()).unwrap();
+            world.settings.gravity = if copy == 1000 { [3.0, -1.0] } else { world.settings.gravity };
+            (0..steps).for_each(|_| world.step().unwrap());
+            world.state_hash()
+        };
+        for (copy, steps) in [(0, 30), (499, 30), (500, 30), (700, 20), (1000, 30), (count - 1, 30)] {
+            assert_eq!(all.state_hash(copy), alone(copy, steps), "copy {copy}");
+        }
+        let mut seen = vec![0.0; all.observation_len()];
+        all.observe(&mut seen);
+        let (world, bodies) = all.world_of(count - 1);
+        let last = &seen[seen.len() - Batch::OBSERVED..];
+        assert_eq!(last[1], world.bodies.position_y[bodies.end - 1]);
     }
 }
 

@@ -1,14 +1,21 @@
-//! Many worlds in one.
+//! Many copies of a scene.
 
-use super::{StepError, World};
+use super::{StepError, World, said};
 use crate::bodies::def::finite_pair;
 use crate::bodies::{Bodies, BodyKind};
 use crate::broadphase::{BroadPhase, Spaces};
 use crate::error::Error;
+use crate::workers::Workers;
 use crate::world::Settings;
 use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Mutex, PoisonError};
 
-/// Copies or variants of a scene that never touch, stepped as one world, so that lanes are filled across them.
+/// Number of bodies in a world of a batch. With their contacts they fit a second-level cache of 1 to 2 MiB, and fill the lanes.
+const BODIES: usize = 2500;
+
+/// Copies or variants of a scene that never touch. Several are in one world, so that lanes are filled across them: as many as
+/// a cache holds. Threads take a world each.
 ///
 /// Every copy has its own space, gravity and start. Its bits are those of the copy alone. Observations and actions are flat
 /// arrays: `[copies][bodies][numbers]`.
@@ -45,13 +52,26 @@ use std::ops::Range;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Batch {
-    world: World,
-    /// First body of each copy, and the end of the last.
-    bodies: Vec<u32>,
-    /// First joint of each copy, and the end of the last.
+    rooms: Vec<Room>,
+    copies: usize,
+    /// Number of copies in a room; the last one has the rest.
+    each: usize,
+    /// Number of bodies of a copy.
+    bodies: usize,
+    /// First joint of each copy in its room, and one more for each room: the number of joints there.
     joints: Vec<u32>,
+    threads: usize,
+    workers: Workers,
+}
+
+/// Copies in one world.
+#[derive(Clone, Debug)]
+struct Room {
+    world: World,
     /// Bodies before the first step.
     start: Bodies,
+    /// What the last step gave.
+    result: Result<(), StepError>,
 }
 
 impl Batch {
@@ -61,10 +81,10 @@ impl Batch {
     /// Numbers of a body in an action: force x, y (N), torque (N·m).
     pub const ACTED: usize = 3;
 
-    /// A batch of `copies`; `build` adds the bodies and joints of each. It may give them other values, but each copy has as
-    /// many bodies as the first.
+    /// A batch of `copies`; `build` adds the bodies and joints of each to a world that has those of others. It may give them
+    /// other values, but each copy has as many bodies as the first.
     ///
-    /// Errors: those of `build`; no copies; a copy with another number of bodies; a body that was removed again.
+    /// Errors: those of `build`; no copies; a copy with another number of bodies, or none; a body that was removed again.
     pub fn new(
         settings: Settings,
         copies: usize,
@@ -73,68 +93,103 @@ impl Batch {
         if copies == 0 {
             return Err(Error::invalid("copies", "must be at least 1"));
         }
-        let mut world = World::new(settings);
-        world.broadphase = BroadPhase::Spaces(Spaces::default());
-        let (mut bodies, mut joints) = (vec![0], vec![0]);
+        let empty = || {
+            let mut world = World::new(Settings { threads: 1, ..settings.clone() });
+            world.broadphase = BroadPhase::Spaces(Spaces::default());
+            world
+        };
+        let (mut each, mut bodies) = (copies, 0);
+        let (mut rooms, mut joints, mut world) = (Vec::new(), Vec::new(), empty());
         for copy in 0..copies {
+            let invalid = |message: String| Error::invalid(format!("copy {copy}"), message);
+            let before = world.bodies.len();
+            joints.push(world.joints().count() as u32);
             build(copy, &mut world).map_err(|e| e.within(&format!("copy {copy}")))?;
             if !world.slots.removed.is_empty() {
-                return Err(Error::invalid(format!("copy {copy}"), "removes a body that it has added"));
+                return Err(invalid("removes a body that it has added".into()));
             }
             if let BroadPhase::Spaces(spaces) = &mut world.broadphase {
                 spaces.end(world.shapes.len());
             }
-            bodies.push(world.bodies.len() as u32);
-            joints.push(world.joints().count() as u32);
-            let [first, own] = [bodies[1], bodies[copy + 1] - bodies[copy]];
-            if own != first {
-                let message = format!("has {own} bodies, and the first copy has {first}");
-                return Err(Error::invalid(format!("copy {copy}"), message));
+            let own = world.bodies.len() - before;
+            if copy == 0 {
+                (bodies, each) = (own, BODIES.div_ceil(own.max(1)));
+            }
+            if own != bodies || own == 0 {
+                return Err(invalid(format!("has {own} bodies, and the first copy has {bodies}")));
+            }
+            if (copy + 1) % each == 0 || copy + 1 == copies {
+                joints.push(world.joints().count() as u32);
+                let world = std::mem::replace(&mut world, empty());
+                rooms.push(Room { start: world.bodies.clone(), world, result: Ok(()) });
             }
         }
-        let start = world.bodies.clone();
-        Ok(Batch { world, bodies, joints, start })
+        let threads = settings.threads;
+        Ok(Batch { rooms, copies, each, bodies, joints, threads, workers: Workers::default() })
     }
 
     /// Number of copies.
     pub fn copies(&self) -> usize {
-        self.bodies.len() - 1
+        self.copies
     }
 
-    /// Indices of the bodies of a copy in [`Self::world`].
+    /// The world that a copy is in, and the indices of its bodies there.
     ///
     /// # Panics
     /// If there is no such copy.
-    pub fn bodies_of(&self, copy: usize) -> Range<usize> {
-        self.bodies[copy] as usize..self.bodies[copy + 1] as usize
+    pub fn world_of(&self, copy: usize) -> (&World, Range<usize>) {
+        let (room, bodies) = self.place(copy);
+        (&self.rooms[room].world, bodies)
     }
 
-    /// All copies as one world.
-    pub fn world(&self) -> &World {
-        &self.world
+    /// Room and bodies of a copy.
+    fn place(&self, copy: usize) -> (usize, Range<usize>) {
+        assert!(copy < self.copies, "copy {copy} of {}", self.copies);
+        let first = copy % self.each * self.bodies;
+        (copy / self.each, first..first + self.bodies)
     }
 
     /// Number of numbers in an observation.
     pub fn observation_len(&self) -> usize {
-        self.world.bodies.len() * Self::OBSERVED
+        self.copies * self.bodies * Self::OBSERVED
     }
 
     /// Number of numbers in an action.
     pub fn action_len(&self) -> usize {
-        self.world.bodies.len() * Self::ACTED
+        self.copies * self.bodies * Self::ACTED
     }
 
     /// Advances all copies by a step. Returns the copies of which a body diverged; the others are not affected.
-    /// Errors: as [`Settings::check`].
+    /// Errors: as [`Settings::check`]; with several threads, a panic.
     pub fn step(&mut self) -> Result<Vec<usize>, StepError> {
-        match self.world.step() {
-            Err(StepError::Diverged(_)) => {
-                let has_diverged =
-                    |&copy: &usize| self.bodies_of(copy).any(|body| self.world.is_out_of_bounds(body));
-                Ok((0..self.copies()).filter(has_diverged).collect())
+        self.workers.set(self.threads);
+        let is_shared = self.workers.count() > 1;
+        let queue = Mutex::new(self.rooms.iter_mut());
+        self.workers.each(0..self.workers.count(), |_| {
+            loop {
+                let next = queue.lock().unwrap_or_else(PoisonError::into_inner).next();
+                let Some(Room { world, result, .. }) = next else { return };
+                *result = if is_shared {
+                    catch_unwind(AssertUnwindSafe(|| world.step()))
+                        .unwrap_or_else(|panic| Err(StepError::Panicked(said(&*panic))))
+                } else {
+                    world.step()
+                };
             }
-            result => result.map(|()| Vec::new()),
+        });
+        let mut diverged = Vec::new();
+        for (i, Room { world, result, .. }) in self.rooms.iter().enumerate() {
+            match result {
+                Ok(()) => {}
+                Err(StepError::Diverged(_)) => {
+                    let copies = i * self.each..self.copies.min((i + 1) * self.each);
+                    let is_out = |&copy: &usize| self.place(copy).1.any(|body| world.is_out_of_bounds(body));
+                    diverged.extend(copies.filter(is_out));
+                }
+                Err(error) => return Err(error.clone()),
+            }
         }
+        Ok(diverged)
     }
 
     /// Puts a copy back to its start: bodies, contacts and joints.
@@ -142,10 +197,11 @@ impl Batch {
     /// # Panics
     /// If there is no such copy.
     pub fn reset(&mut self, copy: usize) {
-        let bodies = self.bodies_of(copy);
-        let joints = self.joints[copy]..self.joints[copy + 1];
-        self.world.bodies.restore(&mut self.start, bodies.clone());
-        self.world.restart(bodies, joints);
+        let (i, bodies) = self.place(copy);
+        let joints = self.joints[copy + i]..self.joints[copy + i + 1];
+        let Room { world, start, .. } = &mut self.rooms[i];
+        world.bodies.restore(start, bodies.clone());
+        world.restart(bodies, joints);
     }
 
     /// Sets the gravity of a copy (m/s²); it lasts beyond resets. Errors: a value that is not finite.
@@ -154,7 +210,8 @@ impl Batch {
     /// If there is no such copy.
     pub fn set_gravity(&mut self, copy: usize, gravity: [f64; 2]) -> Result<(), Error> {
         finite_pair("gravity", gravity)?;
-        let (bodies, world) = (self.bodies_of(copy), &mut self.world);
+        let (i, bodies) = self.place(copy);
+        let world = &mut self.rooms[i].world;
         world.gravities.resize(world.bodies.len(), world.settings.gravity);
         world.gravities[bodies].fill(gravity.map(|x| x as f32));
         Ok(())
@@ -166,8 +223,11 @@ impl Batch {
     /// If `to` has another length than [`Self::observation_len`].
     pub fn observe(&self, to: &mut [f32]) {
         assert_eq!(to.len(), self.observation_len(), "length of an observation");
-        let b = &self.world.bodies;
-        for (i, to) in to.chunks_exact_mut(Self::OBSERVED).enumerate() {
+        let all = self.rooms.iter().flat_map(|room| {
+            let b = &room.world.bodies;
+            (0..b.len()).map(move |i| (b, i))
+        });
+        for ((b, i), to) in all.zip(to.chunks_exact_mut(Self::OBSERVED)) {
             to.copy_from_slice(&[
                 b.position_x[i],
                 b.position_y[i],
@@ -185,10 +245,13 @@ impl Batch {
     /// If `forces` has another length than [`Self::action_len`].
     pub fn act(&mut self, forces: &[f32]) {
         assert_eq!(forces.len(), self.action_len(), "length of an action");
-        let b = &mut self.world.bodies;
-        for (i, force) in forces.chunks_exact(Self::ACTED).enumerate() {
-            if b.kind[i] == BodyKind::Dynamic {
-                (b.force_x[i], b.force_y[i], b.torque[i]) = (force[0], force[1], force[2]);
+        let mut forces = forces.chunks_exact(Self::ACTED);
+        for Room { world, .. } in &mut self.rooms {
+            let b = &mut world.bodies;
+            for (i, force) in (0..b.len()).zip(&mut forces) {
+                if b.kind[i] == BodyKind::Dynamic {
+                    (b.force_x[i], b.force_y[i], b.torque[i]) = (force[0], force[1], force[2]);
+                }
             }
         }
     }
@@ -198,6 +261,7 @@ impl Batch {
     /// # Panics
     /// If there is no such copy.
     pub fn state_hash(&self, copy: usize) -> u64 {
-        self.world.hash_of(self.bodies_of(copy))
+        let (world, bodies) = self.world_of(copy);
+        world.hash_of(bodies)
     }
 }
