@@ -5,6 +5,7 @@ use simpulse::engine::batch::Batch;
 use simpulse::engine::error::Error;
 use simpulse::engine::prelude::*;
 use simpulse::engine::solvers::VARIANTS;
+use simpulse::engine::world::Order;
 use simpulse::lab::scenes::{Scene, SceneBody, SceneShape};
 
 /// Boxes and discs that fall on each other, some fast; the higher the number, the higher they start.
@@ -138,19 +139,70 @@ fn a_copy_that_diverges_is_named_and_can_be_reset() {
 }
 
 #[test]
+fn starts_of_a_copy_can_be_its_own() {
+    let (mut all, mut fresh) = (carts(3), carts(3));
+    all.step().unwrap();
+    all.reset(1);
+    for batch in [&mut all, &mut fresh] {
+        batch.set_pose(1, 1, [0.5, 0.0], 0.0).unwrap();
+        batch.set_velocity(1, 2, [0.0, 0.0], 0.7).unwrap();
+        batch.step().unwrap();
+    }
+    assert_eq!(all.state_hash(1), fresh.state_hash(1));
+    let error = all.set_pose(1, 3, [0.0; 2], 0.0).unwrap_err();
+    assert_eq!(error.to_string(), "body: is 3, and a copy has 3");
+    assert_eq!(
+        all.set_velocity(1, 0, [0.0; 2], 0.0).unwrap_err().to_string(),
+        "body 3: is static and has no velocity"
+    );
+    let mut copied = all.world_of(0).0.clone();
+    let error =
+        copied.add_body(&BodyDef::dynamic([0.0; 2]).with(ShapeDef::circle(0.5).unwrap())).unwrap_err();
+    assert_eq!(error.to_string(), "world: is that of a batch, which has all its bodies");
+}
+
+#[test]
 fn a_batch_says_what_is_wrong_with_a_copy() {
-    let build = |copies: usize, odd: usize| {
-        let result = Batch::new(Settings::default(), copies, |copy, world: &mut World| {
-            let disc = ShapeDef::circle(0.5)?;
-            world.add_body(&BodyDef::dynamic([0.0; 2]).with(disc.clone()))?;
-            if copy == odd {
-                world.add_body(&BodyDef::dynamic([9.0, 0.0]).with(disc))?;
-            }
+    let build_with = |settings: Settings, copies: usize, odd: &dyn Fn(usize, &mut World)| {
+        let result = Batch::new(settings, copies, |copy, world: &mut World| {
+            world.add_body(&BodyDef::dynamic([0.0; 2]).with(ShapeDef::circle(0.5)?))?;
+            odd(copy, world);
             Ok::<(), Error>(())
         });
         result.map(|batch| batch.copies()).map_err(|e| e.to_string())
     };
-    assert_eq!(build(3, 9), Ok(3));
-    assert_eq!(build(0, 9), Err("copies: must be at least 1".into()));
-    assert_eq!(build(3, 1), Err("copy 1: has 2 bodies, and the first copy has 1".into()));
+    let build = |copies: usize, odd: &dyn Fn(usize, &mut World)| build_with(Settings::default(), copies, odd);
+    let ball = || BodyDef::dynamic([9.0, 0.0]).with(ShapeDef::circle(0.5).unwrap());
+    assert_eq!(build(3, &|_, _| {}), Ok(3));
+    assert_eq!(build(0, &|_, _| {}), Err("copies: must be at least 1".into()));
+    let more = |copy: usize, world: &mut World| {
+        if copy == 1 {
+            world.add_body(&ball()).unwrap();
+        }
+    };
+    assert_eq!(build(3, &more), Err("copy 1: has 2 bodies, and the first copy has 1".into()));
+    let joined = |copy: usize, world: &mut World| {
+        if copy == 1 {
+            let [a, b] = [0, 1].map(|i| world.handle(i).unwrap());
+            world.add_joint(&Joint::revolute(a, b).anchor([0.0; 2])).unwrap();
+        }
+    };
+    assert_eq!(build(3, &joined), Err("copy 1: has a joint to a body of another copy".into()));
+    let stepped = "copy 0: steps or replaces the world that it is built in";
+    assert_eq!(build(3, &|_, world| world.step().unwrap()), Err(stepped.into()));
+    for replaced in [0, 2] {
+        let replace = |copy: usize, world: &mut World| {
+            if copy == replaced {
+                *world = World::default();
+                world.add_body(&ball()).unwrap();
+            }
+        };
+        assert_eq!(build(3, &replace), Err(stepped.replace('0', &replaced.to_string())));
+    }
+    let nncg = solvers::find("nncg").unwrap();
+    let error = "solver: nncg solves copies together, so they would see each other";
+    assert_eq!(build_with(Settings::new(nncg), 3, &|_, _| {}), Err(error.into()));
+    let shuffled = Settings { order: Order::Shuffled, ..Settings::default() };
+    let error = "order: of a copy would depend on its number, is shuffled";
+    assert_eq!(build_with(shuffled, 3, &|_, _| {}), Err(error.into()));
 }

@@ -19,12 +19,33 @@ pub struct Spaces {
     last: Vec<[u32; 2]>,
     /// Shapes of a space, by their left sides.
     sorted: Vec<u32>,
+    is_closed: bool,
 }
 
 impl Spaces {
     /// Ends a space: it has all shapes with indices below `shapes` that earlier ones do not have.
     pub fn end(&mut self, shapes: usize) {
         self.ends.push(shapes as u32);
+    }
+
+    /// Number of spaces.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// Allows no more shapes.
+    pub fn close(&mut self) {
+        self.is_closed = true;
+    }
+
+    /// Whether there will be no more shapes.
+    pub fn is_closed(&self) -> bool {
+        self.is_closed
     }
 
     /// Number of the space of a shape.

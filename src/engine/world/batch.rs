@@ -2,11 +2,12 @@
 
 use super::{StepError, World, said};
 use crate::bodies::def::finite_pair;
-use crate::bodies::{Bodies, BodyKind};
+use crate::bodies::{Bodies, BodyHandle, BodyKind};
 use crate::broadphase::{BroadPhase, Spaces};
 use crate::error::Error;
+use crate::joints::Joint;
 use crate::workers::Workers;
-use crate::world::Settings;
+use crate::world::{Order, Settings};
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError};
@@ -17,8 +18,8 @@ const BODIES: usize = 2500;
 /// Copies or variants of a scene that never touch. Several are in one world, so that lanes are filled across them: as many as
 /// a cache holds. Threads take a world each.
 ///
-/// Every copy has its own space, gravity and start. Its bits are those of the copy alone. Observations and actions are flat
-/// arrays: `[copies][bodies][numbers]`.
+/// Every copy has its own space, gravity and start. Its bits are those of the copy alone, with one exception: chains of joints
+/// under `shim` differ in the last digits. Observations and actions are flat arrays: `[copies][bodies][numbers]`.
 ///
 /// ```
 /// use simpulse_engine::batch::Batch;
@@ -82,9 +83,10 @@ impl Batch {
     pub const ACTED: usize = 3;
 
     /// A batch of `copies`; `build` adds the bodies and joints of each to a world that has those of others. It may give them
-    /// other values, but each copy has as many bodies as the first.
+    /// other values, but each copy has as many bodies as the first. What it changes in the settings is undone.
     ///
-    /// Errors: those of `build`; no copies; a copy with another number of bodies, or none; a body that was removed again.
+    /// Errors: those of `build`; no copies; a solver or an order for which islands see each other; a copy with another number of
+    /// bodies, or none; one that removes a body, joins one of another copy, steps or replaces its world.
     pub fn new(
         settings: Settings,
         copies: usize,
@@ -93,21 +95,45 @@ impl Batch {
         if copies == 0 {
             return Err(Error::invalid("copies", "must be at least 1"));
         }
+        if !settings.solver.is_local {
+            let message =
+                format!("{} solves copies together, so they would see each other", settings.solver.name);
+            return Err(Error::invalid("solver", message));
+        }
+        if settings.order == Order::Shuffled {
+            return Err(Error::invalid("order", "of a copy would depend on its number, is shuffled"));
+        }
+        let threads = settings.threads;
+        let settings = Settings { threads: 1, ..settings };
         let empty = || {
-            let mut world = World::new(Settings { threads: 1, ..settings.clone() });
+            let mut world = World::new(settings.clone());
             world.broadphase = BroadPhase::Spaces(Spaces::default());
             world
         };
         let (mut each, mut bodies) = (copies, 0);
+        let spaces_of = |world: &World| match &world.broadphase {
+            BroadPhase::Spaces(spaces) => Some(spaces.len()),
+            _ => None,
+        };
         let (mut rooms, mut joints, mut world) = (Vec::new(), Vec::new(), empty());
         for copy in 0..copies {
             let invalid = |message: String| Error::invalid(format!("copy {copy}"), message);
-            let before = world.bodies.len();
-            joints.push(world.joints().count() as u32);
+            let (before, first_joint, spaces) =
+                (world.bodies.len(), world.joints().count(), spaces_of(&world));
+            joints.push(first_joint as u32);
             build(copy, &mut world).map_err(|e| e.within(&format!("copy {copy}")))?;
             if !world.slots.removed.is_empty() {
                 return Err(invalid("removes a body that it has added".into()));
             }
+            if world.step_index > 0 || spaces_of(&world) != spaces || world.bodies.len() < before {
+                return Err(invalid("steps or replaces the world that it is built in".into()));
+            }
+            let ends = |joint: &Joint| [joint.a.index(), joint.b.index()];
+            if world.joints().skip(first_joint).any(|(_, joint)| ends(joint).iter().any(|&end| end < before))
+            {
+                return Err(invalid("has a joint to a body of another copy".into()));
+            }
+            world.settings.clone_from(&settings);
             if let BroadPhase::Spaces(spaces) = &mut world.broadphase {
                 spaces.end(world.shapes.len());
             }
@@ -120,11 +146,13 @@ impl Batch {
             }
             if (copy + 1) % each == 0 || copy + 1 == copies {
                 joints.push(world.joints().count() as u32);
+                if let BroadPhase::Spaces(spaces) = &mut world.broadphase {
+                    spaces.close();
+                }
                 let world = std::mem::replace(&mut world, empty());
                 rooms.push(Room { start: world.bodies.clone(), world, result: Ok(()) });
             }
         }
-        let threads = settings.threads;
         Ok(Batch { rooms, copies, each, bodies, joints, threads, workers: Workers::default() })
     }
 
@@ -144,7 +172,7 @@ impl Batch {
 
     /// Room and bodies of a copy.
     fn place(&self, copy: usize) -> (usize, Range<usize>) {
-        assert!(copy < self.copies, "copy {copy} of {}", self.copies);
+        assert!(copy < self.copies, "no copy {copy}: there are {}", self.copies);
         let first = copy % self.each * self.bodies;
         (copy / self.each, first..first + self.bodies)
     }
@@ -202,6 +230,48 @@ impl Batch {
         let Room { world, start, .. } = &mut self.rooms[i];
         world.bodies.restore(start, bodies.clone());
         world.restart(bodies, joints);
+    }
+
+    /// Moves body `body` of a copy, as [`World::set_pose`]: position of the origin of its frame (m) and angle (rad). For a start
+    /// of its own after a reset. Errors: no such body; a value that is not finite.
+    ///
+    /// # Panics
+    /// If there is no such copy.
+    pub fn set_pose(
+        &mut self,
+        copy: usize,
+        body: usize,
+        position: [f64; 2],
+        angle: f64,
+    ) -> Result<(), Error> {
+        let (world, handle) = self.body_of(copy, body)?;
+        world.set_pose(handle, position, angle)
+    }
+
+    /// Sets the velocity (m/s) and spin (rad/s) of body `body` of a copy, as [`World::set_velocity`]. Errors: no such body; a
+    /// static body; a value that is not finite.
+    ///
+    /// # Panics
+    /// If there is no such copy.
+    pub fn set_velocity(
+        &mut self,
+        copy: usize,
+        body: usize,
+        velocity: [f64; 2],
+        spin: f64,
+    ) -> Result<(), Error> {
+        let (world, handle) = self.body_of(copy, body)?;
+        world.set_velocity(handle, velocity, spin)
+    }
+
+    /// The world and the handle of body `body` of a copy.
+    fn body_of(&mut self, copy: usize, body: usize) -> Result<(&mut World, BodyHandle), Error> {
+        let (room, bodies) = self.place(copy);
+        let missing = || Error::invalid("body", format!("is {body}, and a copy has {}", self.bodies));
+        let index = bodies.clone().nth(body).ok_or_else(missing)?;
+        let world = &mut self.rooms[room].world;
+        let handle = world.handle(index).ok_or_else(|| Error::invalid("body", "was removed"))?;
+        Ok((world, handle))
     }
 
     /// Sets the gravity of a copy (m/s²); it lasts beyond resets. Errors: a value that is not finite.

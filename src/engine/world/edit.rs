@@ -3,7 +3,7 @@
 use super::{Surface, World};
 use crate::bodies::def::{finite, finite_pair};
 use crate::bodies::{BodyDef, BodyHandle, BodyKind, Filter};
-use crate::broadphase::Proxy;
+use crate::broadphase::{BroadPhase, Proxy};
 use crate::constraints::kernels::types::ConstraintType;
 use crate::error::Error;
 use crate::shapes::{Aabb, MassProperties, Shape};
@@ -98,6 +98,9 @@ impl World {
     /// ```
     pub fn add_body(&mut self, body: &BodyDef) -> Result<BodyHandle, Error> {
         let mass = body.check()?;
+        if matches!(&self.broadphase, BroadPhase::Spaces(spaces) if spaces.is_closed()) {
+            return Err(Error::invalid("world", "is that of a batch, which has all its bodies"));
+        }
         let center = Vec2::new(mass.center[0] as f32, mass.center[1] as f32);
         let shapes: Vec<Shape> = body.shapes.iter().map(|part| part.shape.translated(-center)).collect();
         let count = shapes.len() as u32;
@@ -421,7 +424,10 @@ impl World {
             |i: usize| self.slots.first_shape.get(i).map_or(self.shapes.len() as u32, |&first| first);
         let shapes = shapes(bodies.start)..shapes(bodies.end);
         for i in bodies.clone() {
-            self.fat_boxes.forget(i);
+            // The ground has not moved.
+            if self.bodies.kind[i] != BodyKind::Static {
+                self.fat_boxes.forget(i);
+            }
             self.work.kept.forget_body(i);
         }
         self.applied.retain(|standing| !bodies.contains(&(standing.body as usize)));
