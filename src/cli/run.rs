@@ -422,7 +422,7 @@ fn counts(world: &World) -> String {
     let c = &world.counts;
     format!(
         "\nlast step: {} pairs, {} contacts, {} points, {} rows, {} sweeps, {} colors, {} overflowing, \
-         {:.0} % of lanes filled, {} bytes of records, {} visits of impacts, {} islands cut off\n",
+         {:.0} % of lanes filled, {} bytes of records, {} visits of impacts, {} islands cut off, {} groups of islands, {} threads\n",
         c.pairs,
         c.contacts,
         c.points,
@@ -433,6 +433,8 @@ fn counts(world: &World) -> String {
         100.0 * c.contacts as f64 / c.lane_slots.max(1) as f64,
         c.constraint_bytes,
         c.impact_visits,
-        c.cut_impacts
+        c.cut_impacts,
+        c.groups,
+        world.settings.threads.max(1)
     )
 }

@@ -8,7 +8,7 @@
     reason = "loads and stores by index, which `index` keeps in bounds; vector instructions"
 )]
 
-use super::index::{LaneIndex, assert_fits};
+use super::index::LaneIndex;
 use super::quads::QuadsAt;
 use bytemuck::{Pod, Zeroable};
 use std::marker::PhantomData;
@@ -85,7 +85,8 @@ pub fn gather_8(rows: RowsAt<'_>, index: LaneIndex<[u32; 8]>) -> [wide::f32x8; 8
 #[cfg(all(target_arch = "x86_64", target_feature = "avx"))]
 mod avx {
     use super::super::quads::avx::{from, transpose};
-    use super::{LaneIndex, RowsAt, assert_fits};
+    use super::{LaneIndex, RowsAt};
+    use crate::lanes::index::assert_fits;
     use std::arch::x86_64::*;
     use wide::f32x8;
 
@@ -110,7 +111,8 @@ mod avx {
 #[cfg(all(target_arch = "x86_64", target_feature = "avx512f"))]
 mod avx512 {
     use super::super::quads::avx512::{from, transpose};
-    use super::{LaneIndex, RowsAt, assert_fits};
+    use super::{LaneIndex, RowsAt};
+    use crate::lanes::index::assert_fits;
     use std::arch::x86_64::*;
     use wide::f32x16;
 
