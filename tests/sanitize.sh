@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Looks for data races under ThreadSanitizer: unit tests of the threads, and steps of worlds in groups, in colors and in
 # batches with two and three threads. Needs a nightly toolchain with the component rust-src, since the standard library is
-# built with the sanitizer as well. Takes some minutes.
+# built with the sanitizer as well. Takes a quarter of an hour on two cores.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
