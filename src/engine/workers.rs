@@ -156,6 +156,24 @@ impl Workers {
         }
     }
 
+    /// Calls `each` with every item, in the order of the list, and with one of the `seats`; a thread takes the next item when it
+    /// has finished one. A thread has a seat of its own; there are [`Self::count`] of them.
+    pub fn in_turn<T: Send, S: Send>(
+        &self,
+        items: &mut [T],
+        seats: &mut [S],
+        each: impl Fn(&mut T, &mut S) + Sync,
+    ) {
+        let queue = Mutex::new(items.iter_mut());
+        self.each(seats.iter_mut(), |seat| {
+            loop {
+                let next = queue.lock().unwrap_or_else(PoisonError::into_inner).next();
+                let Some(item) = next else { return };
+                each(item, seat);
+            }
+        });
+    }
+
     /// Size of parts of `len` things, one part for each thread, in whole cache lines of floats; no part is smaller than
     /// `least`.
     pub fn part(&self, len: usize, least: usize) -> usize {
@@ -294,6 +312,16 @@ mod tests {
                 workers.each(seen.iter_mut(), |part| *part += 1);
                 assert!(seen.iter().all(|&times| times == 1), "{threads} threads, {parts} parts: {seen:?}");
             }
+        }
+    }
+
+    #[test]
+    fn every_item_has_its_turn_once() {
+        for threads in [1, 2, 3] {
+            let workers = with(threads);
+            let (mut items, mut seats) = ([0; 50], vec![0; workers.count()]);
+            workers.in_turn(&mut items, &mut seats, |item, seat| (*item, *seat) = (*item + 1, *seat + 1));
+            assert_eq!((items, seats.iter().sum::<i32>()), ([1; 50], 50), "{threads} threads");
         }
     }
 

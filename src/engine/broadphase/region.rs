@@ -72,6 +72,14 @@ impl Region {
 }
 
 impl BroadPhase {
+    /// Calls `visit` with the shapes near an area that `shape` may meet, and perhaps others of its space.
+    pub(crate) fn visit_near(&self, proxies: &[Proxy], shape: u32, area: Aabb, visit: &mut dyn FnMut(u32)) {
+        match self {
+            BroadPhase::Spaces(spaces) => spaces.around(shape).for_each(visit),
+            _ => self.visit(proxies, &mut Region::area(area), |_, shape| visit(shape)),
+        }
+    }
+
     /// Calls `visit` with each proxy whose box overlaps the region; `visit` may shrink the region. The tree
     /// is that of the last call of [`BroadPhase::pairs`] or [`BroadPhase::update`], and `proxies` must be the
     /// same.

@@ -79,7 +79,7 @@ impl Spaces {
         pairs.clear();
         let (mut moved, mut first) = (moved.iter().peekable(), 0);
         for space in 0..self.ends.len() {
-            let end = std::mem::replace(&mut self.pair_ends[space], 0);
+            let end = self.pair_ends[space];
             let mut is_searched = false;
             while moved.next_if(|&&shape| shape < self.ends[space]).is_some() {
                 is_searched = true;

@@ -1,6 +1,6 @@
 //! Many copies of a scene.
 
-use super::{StepError, World, said};
+use super::{StepError, World};
 use crate::bodies::def::finite_pair;
 use crate::bodies::{Bodies, BodyHandle, BodyKind};
 use crate::broadphase::{BroadPhase, Spaces};
@@ -9,8 +9,6 @@ use crate::joints::Joint;
 use crate::workers::Workers;
 use crate::world::{Order, Settings};
 use std::ops::Range;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Mutex, PoisonError};
 
 /// Number of bodies in a world of a batch. With their contacts they fit a second-level cache of 1 to 2 MiB, and fill the lanes.
 const BODIES: usize = 2500;
@@ -59,8 +57,6 @@ pub struct Batch {
     each: usize,
     /// Number of bodies of a copy.
     bodies: usize,
-    /// First joint of each copy in its room, and one more for each room: the number of joints there.
-    joints: Vec<u32>,
     threads: usize,
     workers: Workers,
 }
@@ -69,6 +65,8 @@ pub struct Batch {
 #[derive(Clone, Debug)]
 struct Room {
     world: World,
+    /// First joint of each copy, and the end of the last.
+    joints: Vec<u32>,
     /// Bodies before the first step.
     start: Bodies,
     /// What the last step gave.
@@ -149,11 +147,11 @@ impl Batch {
                 if let BroadPhase::Spaces(spaces) = &mut world.broadphase {
                     spaces.close();
                 }
-                let world = std::mem::replace(&mut world, empty());
-                rooms.push(Room { start: world.bodies.clone(), world, result: Ok(()) });
+                let (world, joints) = (std::mem::replace(&mut world, empty()), std::mem::take(&mut joints));
+                rooms.push(Room { start: world.bodies.clone(), world, joints, result: Ok(()) });
             }
         }
-        Ok(Batch { rooms, copies, each, bodies, joints, threads, workers: Workers::default() })
+        Ok(Batch { rooms, copies, each, bodies, threads, workers: Workers::default() })
     }
 
     /// Number of copies.
@@ -192,18 +190,9 @@ impl Batch {
     pub fn step(&mut self) -> Result<Vec<usize>, StepError> {
         self.workers.set(self.threads);
         let is_shared = self.workers.count() > 1;
-        let queue = Mutex::new(self.rooms.iter_mut());
-        self.workers.each(0..self.workers.count(), |_| {
-            loop {
-                let next = queue.lock().unwrap_or_else(PoisonError::into_inner).next();
-                let Some(Room { world, result, .. }) = next else { return };
-                *result = if is_shared {
-                    catch_unwind(AssertUnwindSafe(|| world.step()))
-                        .unwrap_or_else(|panic| Err(StepError::Panicked(said(&*panic))))
-                } else {
-                    world.step()
-                };
-            }
+        let mut seats = vec![(); self.workers.count()];
+        self.workers.in_turn(&mut self.rooms, &mut seats, |Room { world, result, .. }, ()| {
+            *result = if is_shared { StepError::caught(|| world.step()).flatten() } else { world.step() };
         });
         let mut diverged = Vec::new();
         for (i, Room { world, result, .. }) in self.rooms.iter().enumerate() {
@@ -226,8 +215,9 @@ impl Batch {
     /// If there is no such copy.
     pub fn reset(&mut self, copy: usize) {
         let (i, bodies) = self.place(copy);
-        let joints = self.joints[copy + i]..self.joints[copy + i + 1];
-        let Room { world, start, .. } = &mut self.rooms[i];
+        let Room { world, start, joints, .. } = &mut self.rooms[i];
+        let number = copy % self.each;
+        let joints = joints[number]..joints[number + 1];
         world.bodies.restore(start, bodies.clone());
         world.restart(bodies, joints);
     }

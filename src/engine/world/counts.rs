@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::params::DIVERGED_SPEED;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Counts of the last step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -113,6 +114,15 @@ pub enum StepError {
 }
 
 impl StepError {
+    /// Runs a part of a step. Errors: it panicked.
+    pub(super) fn caught<T>(part: impl FnOnce() -> T) -> Result<T, StepError> {
+        catch_unwind(AssertUnwindSafe(part)).map_err(|panic| {
+            let text = panic.downcast_ref::<&str>().copied();
+            let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+            StepError::Panicked(text.unwrap_or("no message").into())
+        })
+    }
+
     /// The divergence; `None` for a setting out of its range.
     ///
     /// # Panics

@@ -21,7 +21,6 @@ use crate::disjoint::DisjointSets;
 use crate::lanes::{BodyRow, LaneWidth, Shared, SharedRows};
 use crate::solvers::{self, Variant};
 use crate::workers::Workers;
-use std::sync::{Mutex, PoisonError};
 
 /// Weight of a contact; that of a body is 1.
 const CONTACT: u32 = 4;
@@ -32,6 +31,10 @@ const LEAST_ALONE: usize = 8;
 
 /// Least number of groups for several threads, which save the barriers between colors.
 const LEAST_SHARED: usize = 4;
+
+/// After a single island had most contacts, this many changes of contacts go by before islands are looked for again: a pile
+/// seldom falls apart, and to look at it takes as long as a sweep.
+const PAUSE: u32 = 16;
 
 /// Group of a body that is in none.
 const NONE: u32 = u32::MAX;
@@ -51,6 +54,8 @@ pub(super) struct Groups {
     weights: Vec<u32>,
     /// Group of each body that can move. `[bodies]`
     group_of: Vec<u32>,
+    /// Number of changes of contacts until islands are looked for again.
+    pause: u32,
     /// Row of each body in the group that is being filled. `[bodies]`
     row_of: Vec<u32>,
 }
@@ -121,9 +126,16 @@ impl Groups {
     /// Divides islands into groups of about `size` contacts. `false`, and no groups, if a single island has most contacts or
     /// there would be fewer than `least` groups.
     fn divide(&mut self, [size, least]: [usize; 2], kinds: &[BodyKind], contacts: &[Contact]) -> bool {
-        let Groups { list, count, islands, weights, group_of, row_of, .. } = self;
+        let Groups { list, count, islands, weights, group_of, row_of, pause, .. } = self;
         let is_dynamic = |body: u32| kinds[body as usize] == BodyKind::Dynamic;
         *count = 0;
+        let room = u32::try_from(size).unwrap_or(u32::MAX).saturating_mul(CONTACT);
+        let moving = kinds.iter().filter(|kind| **kind != BodyKind::Static).count() as u32;
+        let all = contacts.len() as u32 * CONTACT + moving;
+        *pause = pause.saturating_sub(1);
+        if all / room < least as u32 || *pause > 0 {
+            return false;
+        }
         islands.begin(kinds.len());
         for contact in contacts.iter().filter(|contact| is_dynamic(contact.body_a)) {
             islands.join(contact.body_a, contact.body_b);
@@ -134,9 +146,8 @@ impl Groups {
         for body in (0..kinds.len() as u32).filter(|&body| kinds[body as usize] != BodyKind::Static) {
             weights[islands.least(body) as usize] += 1;
         }
-        let (all, largest) = (weights.iter().sum::<u32>(), weights.iter().copied().max().unwrap_or(0));
-        let room = u32::try_from(size).unwrap_or(u32::MAX).saturating_mul(CONTACT);
-        if 2 * largest > all || (all / room) < least as u32 {
+        if 2 * weights.iter().copied().max().unwrap_or(0) > all {
+            *pause = PAUSE;
             return false;
         }
         group_of.clear();
@@ -188,7 +199,7 @@ impl Groups {
     /// Assigns the lanes of every group, except where they would be those of the last step.
     fn assign(&mut self, widths: [LaneWidth; 2], features: &Features, workers: &Workers) {
         self.seats.resize_with(workers.count(), Seat::default);
-        each(&mut self.list[..self.count], &mut self.seats, workers, |group, seat| {
+        workers.in_turn(&mut self.list[..self.count], &mut self.seats, |group, seat| {
             if !group.is_as_before() {
                 group.assign(widths, features, seat);
             }
@@ -204,23 +215,6 @@ impl Groups {
         }
         colors
     }
-}
-
-/// Calls `each` with every group, in the order of the list; a thread takes the next one when it has finished one.
-fn each(
-    groups: &mut [Group],
-    seats: &mut [Seat],
-    workers: &Workers,
-    each: impl Fn(&mut Group, &mut Seat) + Sync,
-) {
-    let queue = Mutex::new(groups.iter_mut());
-    workers.each(seats.iter_mut(), |seat| {
-        loop {
-            let next = queue.lock().unwrap_or_else(PoisonError::into_inner).next();
-            let Some(group) = next else { return };
-            each(group, seat);
-        }
-    });
 }
 
 impl Group {
@@ -357,7 +351,7 @@ impl World {
             }
             // SAFETY: a contact and a dynamic body are in one group. Rows of other bodies are only read.
             let (rows, contacts) = unsafe { (rows.sent(), contacts.sent()) };
-            each(list, seats, &workers, |group, seat| {
+            workers.in_turn(list, seats, |group, seat| {
                 if !group.is_large {
                     group.solve(seat, rows.get(), contacts.get(), of);
                 }

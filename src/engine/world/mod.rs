@@ -5,7 +5,7 @@
 //! ```
 
 use crate::bodies::{Bodies, Filter};
-use crate::broadphase::{BroadPhase, FatBoxes, Proxy, Region};
+use crate::broadphase::{BroadPhase, FatBoxes, Proxy};
 use crate::clock::{Clock, Phase, Timings};
 use crate::constraints::kernels::motion::{self, MotionInput};
 use crate::constraints::kernels::observe::ObservedRule;
@@ -26,10 +26,8 @@ use edit::{Slots, StandingForces, Target};
 use events::Events;
 use groups::Groups;
 use joints::JointSlots;
-use std::any::Any;
 use std::fmt;
 use std::ops::Range;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use traits::Traits;
 
 pub mod batch;
@@ -137,8 +135,6 @@ pub struct World {
     seams_are_stale: bool,
     assignment: Assignment,
     groups: Groups,
-    /// Whether the coming step is solved as a whole, to be looked at.
-    is_watched: bool,
     /// Scratch memory of [`Batches::check_disjoint`](crate::constraints::records::batches::Batches::check_disjoint).
     seen_rows: Vec<u32>,
     continuous: Continuous,
@@ -161,13 +157,6 @@ pub struct World {
     targets: Vec<Target>,
     events: Events,
     joints: JointSlots,
-}
-
-/// What a panic said.
-pub(super) fn said(panic: &(dyn Any + Send)) -> String {
-    let text =
-        panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-    text.unwrap_or("no message").into()
 }
 
 impl fmt::Debug for World {
@@ -215,7 +204,6 @@ impl World {
             seams_are_stale: true,
             assignment: Assignment::default(),
             groups: Groups::default(),
-            is_watched: false,
             seen_rows: Vec::new(),
             continuous: Continuous::default(),
             continuous_is_stale: true,
@@ -255,8 +243,7 @@ impl World {
         let mut clock = Clock::start(self.settings.timed);
         self.set_workers();
         if self.work.workers.count() > 1 {
-            let whole = AssertUnwindSafe(|| self.solve_and_store(&mut clock));
-            catch_unwind(whole).map_err(|panic| StepError::Panicked(said(&*panic)))?;
+            StepError::caught(|| self.solve_and_store(&mut clock))?;
         } else {
             self.solve_and_store(&mut clock);
         }
@@ -316,10 +303,7 @@ impl World {
                     ignores(joints, filters, pair, pair.map(|i| shape_body[i as usize]))
                         || broadphase.space_of(pair[0]) != broadphase.space_of(pair[1])
                 },
-                near: &|shape, area, visit| match broadphase {
-                    BroadPhase::Spaces(spaces) => spaces.around(shape).for_each(visit),
-                    _ => broadphase.visit(proxies, &mut Region::area(area), |_, shape| visit(shape)),
-                },
+                near: &|shape, area, visit| broadphase.visit_near(proxies, shape, area, visit),
                 joined: &|visit| {
                     let rigid = types.iter().filter(|joined| joined.kind.rigid_size() > 0);
                     rigid.for_each(|joined| joined.kind.ends().iter().for_each(|&ends| visit(ends)));
@@ -330,16 +314,16 @@ impl World {
         motion::store(&mut self.bodies, &self.work.rows, self.features.rotation, &self.work.workers);
     }
 
-    /// Runs every phase of a step, pairs included, without moving the bodies, so that phases can be measured
+    /// Runs every phase of a step, pairs included, without moving the bodies and as a whole, so that phases can be measured
     /// repeatedly on one state. Impulses are kept.
     #[doc(hidden)]
     pub fn frozen_step(&mut self) {
         let mut clock = Clock::start(self.settings.timed);
         self.pairs_are_stale = true;
-        self.is_watched = true;
+        let group_size = std::mem::take(&mut self.settings.group_size);
         self.set_workers();
         self.solve(&mut clock);
-        self.is_watched = false;
+        self.settings.group_size = group_size;
         self.timings = clock.stop();
     }
 
@@ -450,7 +434,7 @@ impl World {
     /// whole world gets it.
     fn group_size(&self) -> usize {
         let s = &self.settings;
-        let is_watched = self.is_watched || s.observe_rule || self.work.watch.is_some();
+        let is_watched = s.observe_rule || self.work.watch.is_some();
         let may = self.solver_is.is_local && s.order == Order::Colored && self.work.types.is_empty();
         if may && !is_watched { s.group_size } else { 0 }
     }
