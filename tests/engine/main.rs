@@ -14,6 +14,7 @@ mod random;
 mod rows;
 mod seams;
 mod shapes;
+mod sleep;
 mod soundness;
 mod structure;
 mod tutorial;

@@ -27,6 +27,11 @@ impl Candidate {
         pair_key(self.shapes[0], self.shapes[1])
     }
 
+    /// Whether the pair has a contact.
+    pub fn touches(&self) -> bool {
+        self.contact != super::batch::NO_CONTACT
+    }
+
     /// A contact of this pair without a manifold.
     pub fn without_manifold(&self) -> Contact {
         Contact {

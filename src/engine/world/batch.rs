@@ -273,6 +273,7 @@ impl Batch {
         let (i, bodies) = self.place(copy);
         let world = &mut self.rooms[i].world;
         world.gravities.resize(world.bodies.len(), world.settings.gravity);
+        bodies.clone().for_each(|body| world.sleep.edit(body as u32));
         world.gravities[bodies].fill(gravity.map(|x| x as f32));
         Ok(())
     }

@@ -75,6 +75,11 @@ impl<'w> Body<'w> {
         self.world.bodies.velocity(self.index()).as_dvec2().to_array()
     }
 
+    /// Whether it sleeps, see [`Settings::sleep`](super::Settings::sleep).
+    pub fn is_asleep(self) -> bool {
+        self.world.is_asleep(self.index())
+    }
+
     /// Angular velocity (rad/s).
     pub fn spin(self) -> f64 {
         self.world.bodies.angular_velocity[self.index()].into()

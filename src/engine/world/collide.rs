@@ -1,6 +1,7 @@
 //! Updates contacts from candidates and carries their impulses from step to step.
 
 use super::World;
+use super::sleep::Sleep;
 use crate::bodies::BodyKind;
 use crate::constraints::Solver;
 use crate::constraints::step::{Collision, CollisionScene};
@@ -61,7 +62,7 @@ impl World {
         self.make_solver();
         self.scale_impulses();
         let narrow = &mut self.narrow;
-        if narrow.count != self.contacts.len() {
+        if narrow.has_lost(self.contacts.len()) {
             // The caller changed the list: the contact indices of candidates are invalid.
             self.contacts.clear();
             narrow.candidates.iter_mut().for_each(|c| c.contact = NO_CONTACT);
@@ -105,8 +106,6 @@ impl World {
         let mut asked = Collision::default();
         self.with_scene(|solver, scene| solver.before_collision(scene, &mut asked));
         let narrow = &mut self.narrow;
-        narrow.list_jobs(self.contacts.len());
-
         let margins = Margins::of(self.settings.length_unit);
         if std::mem::take(&mut self.seams_are_stale) {
             let ground = |shape: usize| {
@@ -116,13 +115,47 @@ impl World {
             };
             self.seams.build(&self.bodies, &self.shapes, &self.shape_body, ground, margins);
         }
+        // `displacements` covers more than a step.
+        let rolling = asked.rolling.map(|Rolling { limit }| Rolling { limit: AHEAD * limit });
+        narrow.fresh.clear();
+        let is_partial = self.sleep.any();
+        let mut points = 0;
+        // An island that something touches wakes, and may touch others.
+        loop {
+            self.narrow.list_jobs(self.contacts.len(), is_partial.then_some(&self.sleep));
+            self.sleep.note_listed();
+            points += self.collide(rolling);
+            if !is_partial || !self.wake_touched() {
+                break;
+            }
+        }
+        points -= self.remove_ghosts();
+        let narrow = &mut self.narrow;
+        if narrow.is_changed {
+            self.sleep.note_change();
+            narrow.sort_contacts(&mut self.contacts);
+        }
+        narrow.count = self.contacts.len();
+        let kept = &mut self.work.kept;
+        kept.follow(self.solver_is.kept, &self.contacts, self.bodies.len());
+        self.with_scene(|solver, scene| solver.after_collision(scene));
+        self.counts.pairs = self.narrow.candidates.len();
+        self.counts.contacts = self.contacts.len();
+        self.counts.points = points;
+        self.counts.rows = if self.features.friction { 2 * points } else { points };
+    }
+
+    /// Updates the contacts of all jobs; returns the number of their points.
+    fn collide(&mut self, rolling: Option<Rolling>) -> usize {
+        let margins = Margins::of(self.settings.length_unit);
         let is_ghost = |contact: &Contact| self.seams.is_ghost(contact, &self.bodies, &self.shapes, margins);
-        let mut ghost_points = 0;
-        let Narrow { candidates, jobs, fresh, is_changed, poses, displacements, shapes, found, .. } = narrow;
-        fresh.clear();
+        let Narrow { candidates, jobs, fresh, is_changed, poses, displacements, shapes, found, .. } =
+            &mut self.narrow;
+        let (mut points, mut ghost_points, sleep) = (0, 0, &mut self.sleep);
         let mut change = |name: u32, contact: &Contact, found: Option<Found>| {
             let candidate = &mut candidates[name as usize];
             candidate.contact = if contact.manifold.count == 0 {
+                sleep.part(candidate.bodies, &self.bodies);
                 NO_CONTACT
             } else {
                 let Contact { manifold, radii, .. } = *contact;
@@ -136,37 +169,35 @@ impl World {
             };
             *is_changed = true;
         };
-        // `displacements` covers more than a step.
-        let rolling = asked.rolling.map(|Rolling { limit }| Rolling { limit: AHEAD * limit });
-        let workers = &self.work.workers;
+        let (workers, freezing) = (&self.work.workers, self.settings.freezing());
         let input = Input { poses, displacements, rolling, shapes, margins, freezing, workers };
-        let (mut points, width, contacts) = (0, self.settings.widths()[1], &mut self.contacts);
+        let (width, contacts) = (self.settings.widths()[1], &mut self.contacts);
         for (kind, jobs) in PairKind::ALL.into_iter().zip(jobs) {
             points += batch::update(kind, width, jobs, input, contacts, found, &mut change);
         }
-        if !self.seams.is_empty() {
-            let touching = candidates.iter_mut().filter(|c| c.contact & FRESH == 0);
-            for candidate in touching {
-                let contact = &self.contacts[candidate.contact as usize];
-                if is_ghost(contact) {
-                    ghost_points += contact.manifold.count as usize;
-                    candidate.contact = NO_CONTACT;
-                    *is_changed = true;
-                }
+        points - ghost_points
+    }
+
+    /// Ends contacts that became ghosts; returns the number of their points.
+    fn remove_ghosts(&mut self) -> usize {
+        if self.seams.is_empty() {
+            return 0;
+        }
+        let margins = Margins::of(self.settings.length_unit);
+        let is_looked_at = |bodies| !self.sleep.any() || self.sleep.is_active(bodies);
+        let mut points = 0;
+        for candidate in &mut self.narrow.candidates {
+            if candidate.contact & FRESH != 0 || !is_looked_at(candidate.bodies) {
+                continue;
+            }
+            let contact = &self.contacts[candidate.contact as usize];
+            if self.seams.is_ghost(contact, &self.bodies, &self.shapes, margins) {
+                points += contact.manifold.count as usize;
+                candidate.contact = NO_CONTACT;
+                self.narrow.is_changed = true;
             }
         }
-        points -= ghost_points;
-        if narrow.is_changed {
-            narrow.sort_contacts(&mut self.contacts);
-        }
-        narrow.count = self.contacts.len();
-        let kept = &mut self.work.kept;
-        kept.follow(self.solver_is.kept, &self.contacts, self.bodies.len());
-        self.with_scene(|solver, scene| solver.after_collision(scene));
-        self.counts.pairs = self.narrow.candidates.len();
-        self.counts.contacts = self.contacts.len();
-        self.counts.points = points;
-        self.counts.rows = if self.features.friction { 2 * points } else { points };
+        points
     }
 
     /// Creates the solver that the settings name, unless it is already active.
@@ -211,6 +242,11 @@ impl Narrow {
         &self.poses
     }
 
+    /// Whether the caller has changed the list, which now has `contacts` contacts.
+    pub fn has_lost(&self, contacts: usize) -> bool {
+        self.count != contacts
+    }
+
     /// Forgets the contacts of pairs of shapes within a range, which meet no others.
     pub fn forget(&mut self, shapes: Range<u32>) {
         let first = |candidate: &Candidate| candidate.shapes[0].min(candidate.shapes[1]);
@@ -247,14 +283,14 @@ impl Narrow {
 
     /// Lists the candidates that may touch, given the number of contacts.
     ///
-    /// If most candidates do not touch, those whose centers are too far apart are skipped before their shapes
+    /// While some bodies sleep, only pairs that `sleep` lists. If most candidates do not touch, those whose centers are too far apart are skipped before their shapes
     /// are read. If most touch, the lists of the last step are reused.
-    fn list_jobs(&mut self, contacts: usize) {
+    fn list_jobs(&mut self, contacts: usize, sleep: Option<&Sleep>) {
         let cull = 4 * contacts < 3 * self.candidates.len();
         if self.jobs_are_current && !cull {
             return;
         }
-        self.jobs_are_current = !cull;
+        self.jobs_are_current = !cull && sleep.is_none();
         for (jobs, names) in self.jobs.iter_mut().zip(&self.of_kind) {
             jobs.list(names, |name| {
                 let candidate = &self.candidates[name as usize];
@@ -262,6 +298,7 @@ impl Narrow {
                 let d = [(b[0] - a[0]) + (b[2] - a[2]), (b[1] - a[1]) + (b[3] - a[3])];
                 let is_near = d[0] * d[0] + d[1] * d[1] <= candidate.reach_squared;
                 let is_listed = is_near | !cull | (candidate.contact != NO_CONTACT);
+                let is_listed = is_listed & sleep.is_none_or(|sleep| sleep.lists(candidate.bodies));
                 (is_listed, candidate.bodies, candidate.numbers, candidate.contact)
             });
         }

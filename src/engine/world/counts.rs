@@ -11,7 +11,7 @@ pub struct StepCounts {
     pub pairs: usize,
     /// Contacts with at least one point.
     pub contacts: usize,
-    /// Contact points.
+    /// Contact points of bodies that are awake.
     pub points: usize,
     /// Constraint rows (normal, and tangential where the scene has friction).
     pub rows: usize,
@@ -26,6 +26,8 @@ pub struct StepCounts {
     /// Groups of islands that were solved one by one; 0 if the world was solved as a whole, see
     /// [`Settings::group_size`](super::Settings::group_size).
     pub groups: usize,
+    /// Bodies that sleep, see [`Settings::sleep`](super::Settings::sleep).
+    pub asleep: usize,
     /// Lanes in all batches; occupancy is `contacts / lane_slots`.
     pub lane_slots: usize,
     /// Bodies that moved farther than half their width; counted only with continuous collision.

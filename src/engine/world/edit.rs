@@ -132,6 +132,7 @@ impl World {
         if !self.filters.is_empty() {
             self.filters.resize(self.shapes.len(), Filter::default());
         }
+        self.sleep.edit(index as u32);
         self.belts.extend(body.belt.then_some(index as u32));
         self.traits.add(body, self.bodies.round[index]);
         self.features = self.traits.features();
@@ -206,6 +207,7 @@ impl World {
             return Err(Error::invalid(format!("body {i}"), "has constraints of another type than contacts"));
         }
         self.remove_joints_of(body);
+        self.sleep.edit(body.index);
         self.seams_are_stale |= self.bodies.kind[i] == BodyKind::Static;
         let nothing = BodyDef::fixed([0.0; 2]);
         self.bodies.set(i, &nothing, &MassProperties::ZERO);
@@ -318,6 +320,7 @@ impl World {
     pub fn set_group(&mut self, body: BodyHandle, group: i32) -> Result<(), Error> {
         let i = self.index_of(body)?;
         self.bodies.group[i] = group;
+        self.sleep.edit(body.index);
         let [first, count] = [self.slots.first_shape[i], self.slots.shapes[i]].map(|k| k as usize);
         self.proxies[first..first + count].iter_mut().for_each(|proxy| proxy.group = group);
         self.pairs_are_stale = true;
@@ -429,6 +432,7 @@ impl World {
                 self.fat_boxes.forget(i);
             }
             self.work.kept.forget_body(i);
+            self.sleep.edit(i as u32);
         }
         self.applied.retain(|standing| !bodies.contains(&(standing.body as usize)));
         self.targets.retain(|target| !bodies.contains(&(target.body as usize)));
@@ -454,6 +458,7 @@ impl World {
 
     /// Adds constraints of a type of your own. They take part in every pass of the solver.
     pub fn add_constraints(&mut self, kind: Box<dyn ConstraintType>) {
+        kind.ends().iter().flatten().for_each(|&body| self.sleep.edit(body));
         self.add_type(kind);
         self.lanes_are_for = None;
     }

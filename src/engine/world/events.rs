@@ -112,6 +112,10 @@ impl World {
         &self.events.list
     }
 
+    pub(super) fn clear_events(&mut self) {
+        self.events.list.clear();
+    }
+
     /// Bodies a and b of a contact of the last step.
     pub fn bodies_of(&self, contact: &Contact) -> [BodyHandle; 2] {
         let handle = |index| BodyHandle { index, generation: self.slots.generation[index as usize] };

@@ -124,26 +124,35 @@ impl Groups {
     }
 
     /// Divides islands into groups of about `size` contacts. `false`, and no groups, if a single island has most contacts or
-    /// there would be fewer than `least` groups.
-    fn divide(&mut self, [size, least]: [usize; 2], kinds: &[BodyKind], contacts: &[Contact]) -> bool {
+    /// there would be fewer than `least` groups. Bodies that are asleep are in none.
+    fn divide(
+        &mut self,
+        [size, least]: [usize; 2],
+        kinds: &[BodyKind],
+        contacts: &[Contact],
+        asleep: &[bool],
+    ) -> bool {
         let Groups { list, count, islands, weights, group_of, row_of, pause, .. } = self;
         let is_dynamic = |body: u32| kinds[body as usize] == BodyKind::Dynamic;
+        let sleeps = |body: u32| asleep.get(body as usize).copied().unwrap_or(false);
+        let moving =
+            || (0..kinds.len() as u32).filter(|&i| kinds[i as usize] != BodyKind::Static && !sleeps(i));
+        let touching = || (0..).zip(contacts).filter(|(_, contact)| !sleeps(contact.body_b));
         *count = 0;
         let room = u32::try_from(size).unwrap_or(u32::MAX).saturating_mul(CONTACT);
-        let moving = kinds.iter().filter(|kind| **kind != BodyKind::Static).count() as u32;
-        let all = contacts.len() as u32 * CONTACT + moving;
+        let all = touching().count() as u32 * CONTACT + moving().count() as u32;
         *pause = pause.saturating_sub(1);
         if all / room < least as u32 || *pause > 0 {
             return false;
         }
         islands.begin(kinds.len());
-        for contact in contacts.iter().filter(|contact| is_dynamic(contact.body_a)) {
+        for (_, contact) in touching().filter(|(_, contact)| is_dynamic(contact.body_a)) {
             islands.join(contact.body_a, contact.body_b);
         }
         weights.clear();
         weights.resize(kinds.len(), 0);
-        contacts.iter().for_each(|contact| weights[islands.least(contact.body_b) as usize] += CONTACT);
-        for body in (0..kinds.len() as u32).filter(|&body| kinds[body as usize] != BodyKind::Static) {
+        touching().for_each(|(_, contact)| weights[islands.least(contact.body_b) as usize] += CONTACT);
+        for body in moving() {
             weights[islands.least(body) as usize] += 1;
         }
         if 2 * weights.iter().copied().max().unwrap_or(0) > all {
@@ -153,7 +162,7 @@ impl Groups {
         group_of.clear();
         group_of.resize(kinds.len(), NONE);
         let (mut group, mut weight) = (0, 0);
-        for body in (0..kinds.len() as u32).filter(|&body| kinds[body as usize] != BodyKind::Static) {
+        for body in moving() {
             let least = islands.least(body);
             if least == body {
                 let own = weights[body as usize];
@@ -172,7 +181,7 @@ impl Groups {
             group_of[body as usize] = if least == body { group as u32 } else { group_of[least as usize] };
             list[group_of[body as usize] as usize].bodies.push(body);
         }
-        for (i, contact) in (0..).zip(contacts) {
+        for (i, contact) in touching() {
             let of = group_of[contact.body_b as usize];
             let group = &mut list[of as usize];
             group.contacts.push(i);
@@ -247,7 +256,7 @@ impl Group {
             ..Contact::default()
         }));
         let partner = |row: u32| PartnerKind::of(kinds[row as usize]);
-        let sides = Sides { bodies: kinds.len(), partner, levels: None };
+        let sides = Sides { bodies: kinds.len(), partner, levels: None, asleep: &[] };
         assignment.colored(work, widths, features, contacts, &sides);
         if *is_large {
             work.lanes.check_disjoint(kinds.len() as u32, seen_rows);
@@ -312,14 +321,14 @@ impl Group {
 impl World {
     /// Divides the step into groups if that pays, and assigns their lanes.
     pub(super) fn group_islands(&mut self, features: &Features) -> bool {
-        let World { groups, settings, bodies, contacts, work, .. } = self;
+        let World { groups, settings, bodies, contacts, work, sleep, .. } = self;
         let choice = Some((settings.widths(), *features, settings.group_size));
         if groups.lanes_are_for != choice {
             groups.list.clear();
             groups.lanes_are_for = choice;
         }
         let least = if work.workers.count() > 1 { LEAST_SHARED } else { LEAST_ALONE };
-        if !groups.divide([settings.group_size, least], &bodies.kind, contacts) {
+        if !groups.divide([settings.group_size, least], &bodies.kind, contacts, sleep.asleep()) {
             return false;
         }
         groups.assign(settings.widths(), features, &work.workers);

@@ -113,6 +113,7 @@ impl World {
         }
         self.traits.spins();
         self.features = self.traits.features();
+        self.edit_ends(&joint);
         self.joints_changed();
         Ok(joint)
     }
@@ -121,8 +122,9 @@ impl World {
     ///
     /// Errors: as [`Self::add_joint`]; the joint was removed.
     pub fn set_joint(&mut self, handle: JointHandle, joint: &Joint) -> Result<(), Error> {
-        self.joint(handle)?;
+        let old = self.joint(handle)?.clone();
         let joint = self.admit(joint)?;
+        self.edit_ends(&old);
         keep_apart(&mut self.joints.apart, &joint);
         self.joints.set(handle.index(), Some(joint));
         Ok(())
@@ -130,7 +132,8 @@ impl World {
 
     /// Removes a joint. Errors: it was removed before.
     pub fn remove_joint(&mut self, handle: JointHandle) -> Result<(), Error> {
-        self.joint(handle)?;
+        let joint = self.joint(handle)?.clone();
+        self.edit_ends(&joint);
         self.joints.remove(handle.index());
         self.joints_changed();
         Ok(())
@@ -307,6 +310,9 @@ impl World {
         while let Some(&[_, joint]) =
             self.joints.of_body.range([body.index, 0]..=[body.index, u32::MAX]).next()
         {
+            if let Some(joint) = self.joints.joints[joint as usize].clone() {
+                self.edit_ends(&joint);
+            }
             self.joints.remove(joint as usize);
             self.joints_changed();
         }
@@ -319,6 +325,11 @@ impl World {
                 self.work.types[group as usize].kind.restart(i as usize);
             }
         }
+    }
+
+    /// Wakes the bodies of a joint.
+    fn edit_ends(&mut self, joint: &Joint) {
+        [joint.a, joint.b].iter().for_each(|body| self.sleep.edit(body.index() as u32));
     }
 
     fn joints_changed(&mut self) {

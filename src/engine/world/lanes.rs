@@ -24,7 +24,7 @@ impl World {
         let partner = |body: u32| PartnerKind::of(kinds[body as usize]);
         let (work, contacts) = (&mut self.work, &self.contacts);
         let levels = self.solver.levels(&self.bodies, contacts);
-        let sides = Sides { bodies: kinds.len(), partner, levels };
+        let sides = Sides { bodies: kinds.len(), partner, levels, asleep: self.sleep.asleep() };
         match self.settings.order {
             Order::Natural => {
                 self.assignment.serial(work, features, contacts, 0..contacts.len() as u32, &sides);

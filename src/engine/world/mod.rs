@@ -26,6 +26,7 @@ use edit::{Slots, StandingForces, Target};
 use events::Events;
 use groups::Groups;
 use joints::JointSlots;
+use sleep::Sleep;
 use std::fmt;
 use std::ops::Range;
 use traits::Traits;
@@ -45,6 +46,7 @@ mod queries;
 #[cfg(feature = "serde")]
 mod saved;
 mod settings;
+mod sleep;
 mod traits;
 
 pub use body::Body;
@@ -157,6 +159,7 @@ pub struct World {
     targets: Vec<Target>,
     events: Events,
     joints: JointSlots,
+    sleep: Sleep,
 }
 
 impl fmt::Debug for World {
@@ -218,6 +221,7 @@ impl World {
             targets: Vec::new(),
             events: Events::default(),
             joints: JointSlots::default(),
+            sleep: Sleep::default(),
             settings,
         }
     }
@@ -241,6 +245,11 @@ impl World {
     pub fn step(&mut self) -> Result<(), StepError> {
         self.settings.check().map_err(StepError::Settings)?;
         let mut clock = Clock::start(self.settings.timed);
+        if !self.begin_sleep() {
+            self.sleep_on();
+            (self.step_index, self.timings) = (self.step_index + 1, clock.stop());
+            return Ok(());
+        }
         self.set_workers();
         if self.work.workers.count() > 1 {
             StepError::caught(|| self.solve_and_store(&mut clock))?;
@@ -250,6 +259,7 @@ impl World {
         self.step_index += 1;
         self.timings = clock.stop();
         self.end_edits();
+        self.end_sleep();
         if self.settings.contact_events {
             self.find_events();
         }
@@ -333,6 +343,7 @@ impl World {
         if self.settings.check().is_err() {
             return;
         }
+        self.begin_sleep();
         self.group_joints();
         self.update_pairs();
         self.update_contacts();
@@ -389,6 +400,7 @@ impl World {
         let motion = MotionInput {
             gravity: s.gravity,
             gravities: &self.gravities,
+            asleep: self.sleep.asleep(),
             h: s.h(),
             features: Features { damping: features.damping, ..self.features },
             integrator: s.integrator,

@@ -6,6 +6,7 @@
 use super::edit::{Slots, StandingForces, Target};
 use super::events::Events;
 use super::joints::SavedJoints;
+use super::sleep::Sleep;
 use super::traits::Traits;
 use super::{Settings, World};
 use crate::bodies::{Bodies, BodyDef, Filter};
@@ -88,6 +89,8 @@ struct SavedWorld {
     traits: Traits,
     #[serde(default)]
     joints: SavedJoints,
+    #[serde(default)]
+    sleep: Sleep,
 }
 
 /// Errors: constraints of the caller's own types.
@@ -116,6 +119,7 @@ impl Serialize for World {
             events: self.events.clone(),
             traits: self.traits,
             joints: SavedJoints::of(self),
+            sleep: self.sleep.clone(),
         };
         saved.serialize(to)
     }
@@ -166,6 +170,9 @@ impl SavedWorld {
             shape.check().map_err(|e| format!("shapes[{i}]: {e}"))?;
         }
         self.joints.check(n)?;
+        if !self.sleep.is_consistent(n) {
+            return Err("sleep: lists of other lengths than of bodies".into());
+        }
         if !self.kept.is_consistent() {
             return Err("kept: as many numbers as names".into());
         }
@@ -222,6 +229,7 @@ impl SavedWorld {
         }
         world.solver.set_kept(&self.of_solver);
         self.joints.restore(&mut world);
+        world.sleep = self.sleep;
         world.update_pairs();
         world.contacts = self.contacts;
         world.narrow.relink(&mut world.contacts);

@@ -127,6 +127,10 @@ pub struct Settings {
     /// Every number gives the same bits.
     #[cfg_attr(feature = "serde", serde(default = "super::saved::group_size"))]
     pub group_size: usize,
+    /// Islands that have rested for half a second sleep: they are not solved until a body, an edit or a change of gravity
+    /// wakes them. For solvers whose islands do not see each other.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub sleep: bool,
     /// Extra kernel features to compile in, to measure their cost.
     pub extra_features: Features,
 }
@@ -165,6 +169,7 @@ impl Settings {
             continuous: solver.continuous,
             threads: 1,
             group_size: GROUP_SIZE,
+            sleep: false,
             extra_features: Features::NONE,
         }
     }
@@ -173,7 +178,7 @@ impl Settings {
     ///
     /// Errors, with field and value: a `dt` or `length_unit` that is not positive and finite; no substeps, or so many that
     /// the reciprocal of [`Self::h`] is not finite; a gravity that is not finite; a limit of `frozen` that is negative or not
-    /// finite; a parameter out of its range.
+    /// finite; sleep with a solver whose islands see each other; a parameter out of its range.
     pub fn check(&self) -> Result<(), Error> {
         let positive = |place: &str, value: f32| {
             let message = || Error::invalid(place, format!("must be positive and finite, is {value:?}"));
@@ -190,6 +195,10 @@ impl Settings {
         if let Freezing::Within(FreezeLimits { distance, turn, .. }) = self.frozen {
             not_negative("frozen.distance", distance.into())?;
             not_negative("frozen.turn", turn.into())?;
+        }
+        if self.sleep && !self.solver.is_local {
+            let message = format!("{} solves all islands together, so none can sleep", self.solver.name);
+            return Err(Error::invalid("sleep", message));
         }
         self.solver.check(&self.parameters).map_err(|e| e.within("parameters"))
     }

@@ -186,6 +186,7 @@ impl<'a> Replay<'a> {
         // The rows start at v*, which includes forces already, so nothing is added to them.
         let motion = MotionInput {
             gravity: [0.0; 2],
+            asleep: &[],
             gravities: &[],
             h,
             features,
@@ -380,7 +381,7 @@ impl<'a> Replay<'a> {
         let (work, features, contacts) = (&mut self.work, &self.input.features, &self.contacts);
         let solver = self.solver.as_mut();
         let levels = solver.and_then(|solver| solver.levels(&self.bodies, contacts));
-        let sides = Sides { bodies, partner: |body| partner(problem, body), levels };
+        let sides = Sides { bodies, partner: |body| partner(problem, body), levels, asleep: &[] };
         let mut assignment = Assignment::default();
         if self.sequence == Sequence::Colored {
             assignment.colored(work, [self.width; 2], features, contacts, &sides);

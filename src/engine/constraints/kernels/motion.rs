@@ -47,6 +47,8 @@ pub struct MotionInput<'a> {
     pub gravity: [f32; 2],
     /// Gravity of each body instead, if not empty (m/s²). `[bodies]`
     pub gravities: &'a [[f32; 2]],
+    /// Which bodies sleep; may be empty. Nothing moves them. `[bodies]`
+    pub asleep: &'a [bool],
     /// Substep (s).
     pub h: f32,
     /// Features of the scene itself.
@@ -83,7 +85,7 @@ impl Motion {
         step: &MotionInput<'_>,
         workers: &Workers,
     ) {
-        let &MotionInput { gravity, gravities, h, features, integrator, rotation } = step;
+        let &MotionInput { gravity, gravities, asleep, h, features, integrator, rotation } = step;
         let count = bodies.len();
         (self.h, self.integrator, self.rotation) = (h, integrator, rotation);
         self.round.clear();
@@ -103,15 +105,16 @@ impl Motion {
         workers.each(parts, |(first, (rows, increments), damp)| {
             for (k, (row, increment)) in rows.iter_mut().zip(increments).enumerate() {
                 let i = first + k;
-                let inv_mass = bodies.inv_mass[i];
+                let sleeps = asleep.get(i).copied().unwrap_or(false);
+                let inv_mass = if sleeps { 0.0 } else { bodies.inv_mass[i] };
                 // Without rotation, infinite inertia marks that nothing turns the body.
-                let inv_inertia = if features.rotation { bodies.inv_inertia[i] } else { 0.0 };
+                let inv_inertia = if features.rotation && !sleeps { bodies.inv_inertia[i] } else { 0.0 };
                 let (vx, vy) = (bodies.velocity_x[i], bodies.velocity_y[i]);
                 *row = BodyRow {
                     velocity: [vx, vy, bodies.angular_velocity[i], inv_mass],
                     delta: [0.0, 0.0, 0.0, inv_inertia],
                 };
-                let moves = bodies.kind[i] == BodyKind::Dynamic;
+                let moves = bodies.kind[i] == BodyKind::Dynamic && !sleeps;
                 *increment = [0.0; 4];
                 if moves {
                     let scale = bodies.gravity_scale[i];

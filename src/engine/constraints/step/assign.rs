@@ -60,6 +60,8 @@ pub struct Sides<'a, F> {
     pub partner: F,
     /// The graph by whose levels contacts are grouped, if they are.
     pub levels: Option<&'a Graph>,
+    /// Which bodies sleep; may be empty. Their constraints get no lane. `[bodies]`
+    pub asleep: &'a [bool],
 }
 
 impl<F> Sides<'_, F> {
@@ -69,6 +71,11 @@ impl<F> Sides<'_, F> {
         let of = |body: u32| graph.levels().get(body as usize).copied().unwrap_or(0);
         let level = of(rows[0]).max(of(rows[1]));
         if level == UNSUPPORTED { 0 } else { level }
+    }
+
+    /// Whether a constraint of these bodies gets no lane.
+    fn sleeps(&self, rows: [u32; 2]) -> bool {
+        self.asleep.get(rows[1] as usize).copied().unwrap_or(false)
     }
 }
 
@@ -98,7 +105,7 @@ impl Assignment {
         let types = work.types.iter().enumerate().flat_map(|(k, joined)| {
             joined.kind.ends().iter().enumerate().map(move |(i, &rows)| (k as u32 + 1, i, rows))
         });
-        for (kind, index, rows) in all.chain(types) {
+        for (kind, index, rows) in all.chain(types).filter(|&(.., rows)| !sides.sleeps(rows)) {
             let partner = (sides.partner)(rows[0]);
             let group = &mut self.groups[partner as usize];
             group.entries.push(Assigned { level: sides.level(rows), kind, index: index as u32, rows });
@@ -204,10 +211,11 @@ impl Assignment {
                 index: i as u32,
                 rows,
             };
-            list.extend(joined.kind.ends().iter().enumerate().map(entry));
+            let awake = joined.kind.ends().iter().enumerate().filter(|(_, rows)| !sides.sleeps(**rows));
+            list.extend(awake.map(entry));
         }
         let rows = |i: u32| [contacts[i as usize].body_a, contacts[i as usize].body_b];
-        list.extend(order.map(|i| Assigned {
+        list.extend(order.filter(|&i| !sides.sleeps(rows(i))).map(|i| Assigned {
             level: sides.level(rows(i)),
             kind: 0,
             index: i,
