@@ -189,10 +189,10 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         ..Trial::new(scene, settings.clone())
     };
     let found = trial.run(&mut |world| {
-        if world.step_index == 0 {
+        if world.step_index() == 0 {
             note(&size_note(world).unwrap_or_default());
         }
-        bar.step(world.step_index as usize, scene.steps as usize, "steps");
+        bar.step(world.step_index() as usize, scene.steps as usize, "steps");
         sheets.add(world, scene)
     })?;
     drop(bar);
@@ -419,7 +419,7 @@ fn head(world: &World, scene: &Scene) -> String {
 }
 
 fn counts(world: &World) -> String {
-    let c = &world.counts;
+    let c = world.counts();
     format!(
         "\nlast step: {} pairs, {} contacts, {} points, {} rows, {} sweeps, {} colors, {} overflowing, \
          {:.0} % of lanes filled, {} bytes of records, {} visits of impacts, {} islands cut off, {} groups of islands, {} threads\n",

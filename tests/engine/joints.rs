@@ -667,7 +667,7 @@ fn a_pendulum_on_the_ground_does_not_matter_to_what_lands_there() {
         }
         let step = |_| {
             world.step().unwrap();
-            world.counts.impact_visits
+            world.counts().impact_visits
         };
         (0..100).map(step).sum::<usize>()
     };

@@ -21,7 +21,7 @@ fn a_saved_world_goes_on_with_the_same_bits() {
                 crate::common::run(&crate::common::scene(scene), crate::common::settings(variant), 40);
             let mut saved = again(&world);
             assert_eq!(saved.state_hash(), world.state_hash());
-            assert_eq!(saved.step_index, world.step_index);
+            assert_eq!(saved.step_index(), world.step_index());
             let mut same = true;
             for _ in 0..30 {
                 // If a solver diverges, it does so in both worlds.

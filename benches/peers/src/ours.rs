@@ -45,6 +45,6 @@ impl Engine for Simpulse {
     }
 
     fn points(&self) -> usize {
-        self.0.counts.points
+        self.0.counts().points
     }
 }

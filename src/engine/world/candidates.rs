@@ -17,6 +17,12 @@ pub(super) fn ignores(joints: &JointSlots, filters: &[Filter], [i, j]: [u32; 2],
     joints.keeps_apart(bodies) || (!filters.is_empty() && !meet())
 }
 
+/// Squared distance of the centers of two bodies within which shapes of these reaches may touch (m²).
+pub(super) fn reach_squared(reach: [f32; 2], length_unit: f32) -> f32 {
+    let reach = reach[0] + reach[1] + length_unit * SPECULATIVE_DISTANCE;
+    reach * reach * REACH_ROUNDING
+}
+
 impl World {
     /// Rebuilds the candidates from `self.pairs`; persisting ones keep their contact.
     ///
@@ -41,18 +47,15 @@ impl World {
             while last.next_if(|old| old.pair() < key).is_some() {}
             let candidate = match last.next_if(|old| old.pair() == key) {
                 Some(old) => *old,
-                None => {
-                    let reach = sa.reach + sb.reach + self.settings.length_unit * SPECULATIVE_DISTANCE;
-                    Candidate {
-                        shapes: [a, b],
-                        bodies,
-                        numbers: [sa.number, sb.number],
-                        reach_squared: reach * reach * REACH_ROUNDING,
-                        friction: (sa.friction * sb.friction).sqrt(),
-                        restitution: sa.restitution.max(sb.restitution),
-                        contact: NO_CONTACT,
-                    }
-                }
+                None => Candidate {
+                    shapes: [a, b],
+                    bodies,
+                    numbers: [sa.number, sb.number],
+                    reach_squared: reach_squared([sa.reach, sb.reach], self.settings.length_unit),
+                    friction: (sa.friction * sb.friction).sqrt(),
+                    restitution: sa.restitution.max(sb.restitution),
+                    contact: NO_CONTACT,
+                },
             };
             kept += usize::from(candidate.contact != NO_CONTACT);
             narrow.of_kind[kind as usize].push(narrow.candidates.len() as u32);

@@ -1,11 +1,14 @@
 //! Bounds and candidate pairs.
 
 use super::World;
+use super::candidates::reach_squared;
 use crate::bodies::BodyKind;
+use crate::broadphase::BroadPhase;
 
 impl World {
     /// Updates the bounds of shapes that left theirs; if any did, updates the pairs.
     pub(super) fn update_pairs(&mut self) {
+        self.follow_settings();
         let World { bodies, proxies, pairs, settings, work, .. } = self;
         let moved = self.fat_boxes.update(bodies, [settings.dt, settings.length_unit], proxies);
         let is_ground = |&shape: &u32| bodies.kind[proxies[shape as usize].body as usize] == BodyKind::Static;
@@ -19,5 +22,23 @@ impl World {
         }
         self.pairs_are_stale = false;
         self.update_candidates();
+    }
+
+    /// Starts anew with another broad phase, or with bounds and candidates of another length unit.
+    fn follow_settings(&mut self) {
+        let (kind, unit) = (self.settings.broadphase, self.settings.length_unit);
+        let (old_kind, old_unit) = std::mem::replace(&mut self.bounds_are_for, (kind, unit));
+        if kind != old_kind && !matches!(self.broadphase, BroadPhase::Spaces(_)) {
+            self.broadphase = BroadPhase::new(kind);
+            self.pairs_are_stale = true;
+        }
+        if unit != old_unit {
+            (0..self.bodies.len()).filter(|&i| self.slots.lives[i]).for_each(|i| self.fat_boxes.forget(i));
+            (self.pairs_are_stale, self.seams_are_stale) = (true, true);
+            for candidate in &mut self.narrow.candidates {
+                candidate.reach_squared =
+                    reach_squared(candidate.shapes.map(|shape| self.surfaces[shape as usize].reach), unit);
+            }
+        }
     }
 }

@@ -185,7 +185,8 @@ impl Observation {
             self.tangent.add(tangent);
             // In the first step of a scene, bodies that are placed flush overlap or not by rounding alone, and so do
             // rules differ that treat gaps and overlaps differently.
-            let lighter = lighter_weight([a, b].map(|i| &self.previous[*i])).filter(|_| world.step_index > 1);
+            let lighter =
+                lighter_weight([a, b].map(|i| &self.previous[*i])).filter(|_| world.step_index() > 1);
             if let Some(lighter) = lighter {
                 self.lighter.add(normal.hypot(tangent) / (lighter * self.dt));
             }
@@ -203,7 +204,7 @@ impl Observation {
         let kinetic: f64 = now.iter().map(BodyState::kinetic_energy).sum();
         self.rest.add(ratio(2.0 * kinetic, self.balance.mass()), &now, &points);
         if self.blown_up.is_none() && self.balance.is_blown_up(kinetic) {
-            self.blown_up = Some(fastest(&now, world.step_index));
+            self.blown_up = Some(fastest(&now, world.step_index()));
         }
         self.previous = now;
         self.steps += 1;
@@ -347,7 +348,7 @@ fn snapshot(world: &World) -> Vec<BodyState> {
 fn contact_points(world: &World) -> Vec<([usize; 2], PointStep)> {
     let wide = |v: Vec2| v.as_dvec2();
     let slowest = f64::from(RESTITUTION_THRESHOLD * world.settings.length_unit);
-    let mut points = Vec::with_capacity(world.counts.points);
+    let mut points = Vec::with_capacity(world.counts().points);
     for contact in &world.contacts {
         for (point, impulse) in contact.manifold.points().iter().zip(contact.step_impulse) {
             let step = PointStep {
