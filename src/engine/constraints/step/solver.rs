@@ -35,8 +35,10 @@ pub trait Solver: CloneSolver + fmt::Debug + Send + Sync {
         Vec::new()
     }
 
-    /// Takes the numbers of [`Self::kept`]; those of another solver, or of other bodies, are ignored.
-    fn set_kept(&mut self, _kept: &[f64]) {}
+    /// Takes the numbers of [`Self::kept`], or none. Returns whether it can; those of bodies that are gone are ignored.
+    fn set_kept(&mut self, kept: &[f64]) -> bool {
+        kept.is_empty()
+    }
 }
 
 /// A copy of a solver, with all data that it keeps. Every solver that is `Clone` has it.
