@@ -139,7 +139,7 @@ const ROWS_OF_LINE: usize = 9;
 /// Writes a line per joint.
 fn write_joints(sheet: &mut CsvFile, world: &World) -> Result<(), Error> {
     let mut lines: BTreeMap<usize, [Option<f32>; ROWS_OF_LINE]> = BTreeMap::new();
-    for SolvedBlock { joint, block, step_impulses } in world.solved_blocks() {
+    for SolvedBlock { joint, block, step_impulses, .. } in world.solved_blocks() {
         let Some(joint) = joint else { continue };
         let impulses = lines.entry(joint.index()).or_default();
         for (j, impulse) in block.jacobians.iter().zip(step_impulses).take(block.size) {

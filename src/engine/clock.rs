@@ -83,6 +83,7 @@ impl Phase {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default)]
+#[non_exhaustive]
 pub struct Timings {
     /// Nanoseconds per phase, indexed by `Phase as usize`.
     pub phase_ns: [u64; Phase::ALL.len()],

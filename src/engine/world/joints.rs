@@ -16,6 +16,7 @@ use std::ops::Range;
 
 /// A block of rows of a joint after a step.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct SolvedBlock {
     /// The joint; `None` for a constraint of the caller's own type.
     pub joint: Option<JointHandle>,

@@ -335,7 +335,7 @@ fn fastest(bodies: &[BodyState], step: u64) -> Divergence {
         .flat_map(|b| [(Quantity::Speed, b.velocity.length()), (Quantity::Spin, b.angular_velocity.abs())]);
     let (i, (quantity, speed)) =
         speeds.enumerate().max_by(|a, b| a.1.1.total_cmp(&b.1.1)).unwrap_or_default();
-    Divergence { step, body: i / 2, quantity, speed: speed as f32, criterion: Criterion::Energy }
+    Divergence::new(step, i / 2, quantity, speed as f32, Criterion::Energy)
 }
 
 /// State of every body in double precision.

@@ -101,13 +101,11 @@ impl Pane {
         match self.world.step() {
             Ok(()) => {}
             Err(StepError::Settings(error)) => return Err(error.into()),
-            Err(error @ StepError::Panicked(_)) => {
-                return Err(Error::invalid("threads", error.to_string()));
-            }
             Err(StepError::Diverged(divergence)) => {
                 self.failure = Some(divergence.into());
                 return Ok(());
             }
+            Err(error) => return Err(Error::invalid("threads", error.to_string())),
         }
         if let Some(single) = &mut single {
             single.observe(&self.world);

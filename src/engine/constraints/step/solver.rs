@@ -60,6 +60,7 @@ impl Clone for Box<dyn Solver> {
 }
 
 /// The part of a world that a solver can access around a collision.
+#[non_exhaustive]
 pub struct CollisionScene<'a> {
     /// Bodies at the beginning of the step.
     pub bodies: &'a Bodies,
@@ -85,6 +86,7 @@ pub struct CollisionScene<'a> {
 
 /// A solver's requests for the next collision phase.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Collision {
     /// Which contacts roll. `None` if no radii of curvature are needed ([`Contact::radii`]).
     pub rolling: Option<Rolling>,
