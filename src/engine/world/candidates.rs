@@ -34,13 +34,14 @@ impl World {
         narrow.of_kind.iter_mut().for_each(Vec::clear);
         let mut last = narrow.last_candidates.iter().peekable();
         let mut kept = 0;
+        let may_ignore = !self.filters.is_empty() || self.joints.keeps_any_apart();
         for &[i, j] in &self.pairs {
             let (a, b) = if self.proxies[j as usize].dynamic { (i, j) } else { (j, i) };
             let [sa, sb] = [a, b].map(|shape| &self.surfaces[shape as usize]);
             let bodies = [a, b].map(|shape| self.shape_body[shape as usize]);
             // Two segments never touch.
             let Some(kind) = PairKind::of(sa.class, sb.class) else { continue };
-            if ignores(&self.joints, &self.filters, [a, b], bodies) {
+            if may_ignore && ignores(&self.joints, &self.filters, [a, b], bodies) {
                 continue;
             }
             let key = pair_key(i, j);
@@ -60,6 +61,11 @@ impl World {
             kept += usize::from(candidate.contact != NO_CONTACT);
             narrow.of_kind[kind as usize].push(narrow.candidates.len() as u32);
             narrow.candidates.push(candidate);
+        }
+        narrow.on_seams.clear();
+        if !self.seams.is_empty() {
+            let has_seams = |(_, candidate): &(u32, &Candidate)| self.seams.has(candidate.shapes[0]);
+            narrow.on_seams.extend((0..).zip(&narrow.candidates).filter(has_seams).map(|(name, _)| name));
         }
         narrow.extents.clear();
         narrow.extents.resize(self.bodies.len(), 0.0);

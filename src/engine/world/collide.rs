@@ -1,7 +1,6 @@
 //! Updates contacts from candidates and carries their impulses from step to step.
 
 use super::World;
-use crate::bodies::BodyKind;
 use crate::constraints::Solver;
 use crate::constraints::step::{Collision, CollisionScene};
 use crate::contacts::Contact;
@@ -20,6 +19,8 @@ pub(super) struct Narrow {
     /// Candidates, sorted by shape pair.
     pub candidates: Vec<Candidate>,
     pub last_candidates: Vec<Candidate>,
+    /// Candidates of shapes with seams.
+    pub on_seams: Vec<u32>,
     /// Candidates by [`PairKind`].
     pub of_kind: [Vec<u32>; PairKind::ALL.len()],
     /// Shapes as the lane kernels read them.
@@ -108,17 +109,11 @@ impl World {
         narrow.list_jobs(self.contacts.len());
 
         let margins = Margins::of(self.settings.length_unit);
-        if std::mem::take(&mut self.seams_are_stale) {
-            let ground = |shape: usize| {
-                let body = self.shape_body[shape] as usize;
-                let is_ground = self.bodies.kind[body] == BodyKind::Static && self.slots.lives[body];
-                is_ground.then(|| self.broadphase.space_of(shape as u32))
-            };
-            self.seams.build(&self.bodies, &self.shapes, &self.shape_body, ground, margins);
-        }
         let is_ghost = |contact: &Contact| self.seams.is_ghost(contact, &self.bodies, &self.shapes, margins);
         let mut ghost_points = 0;
-        let Narrow { candidates, jobs, fresh, is_changed, poses, displacements, shapes, found, .. } = narrow;
+        let Narrow {
+            candidates, on_seams, jobs, fresh, is_changed, poses, displacements, shapes, found, ..
+        } = narrow;
         fresh.clear();
         let mut change = |name: u32, contact: &Contact, found: Option<Found>| {
             let candidate = &mut candidates[name as usize];
@@ -144,15 +139,13 @@ impl World {
         for (kind, jobs) in PairKind::ALL.into_iter().zip(jobs) {
             points += batch::update(kind, width, jobs, input, contacts, found, &mut change);
         }
-        if !self.seams.is_empty() {
-            let touching = candidates.iter_mut().filter(|c| c.contact & FRESH == 0);
-            for candidate in touching {
-                let contact = &self.contacts[candidate.contact as usize];
-                if is_ghost(contact) {
-                    ghost_points += contact.manifold.count as usize;
-                    candidate.contact = NO_CONTACT;
-                    *is_changed = true;
-                }
+        for &name in &*on_seams {
+            let candidate = &mut candidates[name as usize];
+            let contact = self.contacts.get(candidate.contact as usize).filter(|contact| is_ghost(contact));
+            if let Some(contact) = contact {
+                ghost_points += contact.manifold.count as usize;
+                candidate.contact = NO_CONTACT;
+                *is_changed = true;
             }
         }
         points -= ghost_points;

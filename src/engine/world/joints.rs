@@ -51,7 +51,12 @@ pub(super) struct JointSlots {
 impl JointSlots {
     /// Whether a joint keeps two bodies from colliding.
     pub fn keeps_apart(&self, [a, b]: [u32; 2]) -> bool {
-        !self.apart.is_empty() && self.apart.contains(&[a.min(b), a.max(b)])
+        self.keeps_any_apart() && self.apart.contains(&[a.min(b), a.max(b)])
+    }
+
+    /// Whether joints keep any bodies from colliding.
+    pub fn keeps_any_apart(&self) -> bool {
+        !self.apart.is_empty()
     }
 
     fn remove(&mut self, index: usize) {

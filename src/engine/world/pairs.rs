@@ -4,6 +4,7 @@ use super::World;
 use super::candidates::reach_squared;
 use crate::bodies::BodyKind;
 use crate::broadphase::BroadPhase;
+use crate::narrowphase::Margins;
 
 impl World {
     /// Updates the bounds of shapes that left theirs; if any did, updates the pairs.
@@ -21,6 +22,15 @@ impl World {
             return;
         }
         self.pairs_are_stale = false;
+        if std::mem::take(&mut self.seams_are_stale) {
+            let ground = |shape: usize| {
+                let body = self.shape_body[shape] as usize;
+                let is_ground = self.bodies.kind[body] == BodyKind::Static && self.slots.lives[body];
+                is_ground.then(|| self.broadphase.space_of(shape as u32))
+            };
+            let margins = Margins::of(self.settings.length_unit);
+            self.seams.build(&self.bodies, &self.shapes, &self.shape_body, ground, margins);
+        }
         self.update_candidates();
     }
 
