@@ -76,7 +76,7 @@ fn sweep_once<R: NormalRule>(work: &mut Workspace, rule: R) {
 }
 
 fn all(filter: &str) -> ExitCode {
-    let contacts = settled(LaneWidth::W8).counts.contacts as f64;
+    let contacts = settled(LaneWidth::W8).counts().contacts as f64;
     println!("{:<40}{:>14}{:>14}", "id", "instructions", "per contact");
     for what in ["soft", "relax", "step"] {
         for width in WIDTHS {

@@ -1,10 +1,10 @@
-//! Whole steps: `step/<solver>/<scene>/<width>`.
+//! Whole steps: `step/<solver>/<scene>/<width>`, and `step/asleep/<scene>` of worlds that sleep.
 //!
 //! Before a scene is timed at a width, 30 steps must be bit-identical to those with scalar lanes.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use simpulse::engine::lanes::LaneWidth;
-use simpulse::engine::solvers::{VARIANTS, Variant};
+use simpulse::engine::solvers::{self, VARIANTS, Variant};
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes;
 
@@ -36,5 +36,17 @@ fn bench(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, bench);
+/// A pyramid of 5050 boxes that sleeps.
+fn asleep(c: &mut Criterion) {
+    let scene = scenes::load("large_pyramid").expect("a scene of the catalog").scene;
+    let settings = Settings { sleep: true, ..Settings::new(solvers::SOFT_STEP) };
+    let mut world = scene.build(settings).expect("a valid scene");
+    let steps =
+        (0..600).take_while(|_| world.step().is_ok() && world.counts().asleep < scene.bodies.len() - 1);
+    println!("step/asleep/large_pyramid: asleep after {} steps", steps.count());
+    assert_eq!(world.counts().asleep, scene.bodies.len() - 1);
+    c.bench_function("step/asleep/large_pyramid", |b| b.iter(|| world.step()));
+}
+
+criterion_group!(benches, bench, asleep);
 criterion_main!(benches);

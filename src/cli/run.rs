@@ -94,6 +94,9 @@ pub struct RunArgs {
     /// Continuous collision: stop fast bodies at the surfaces that they would pass through [default: the solver's]
     #[arg(help_heading = "Solver and setting", long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pub continuous: Option<bool>,
+    /// Let islands sleep that have rested for half a second, until something touches them
+    #[arg(help_heading = "Solver and setting", long)]
+    pub sleep: bool,
     /// Push random bodies at random times in the first half of the run, as a player would; the seed decides which and
     /// when. The figures are those of the poked run, and bodies are compared with an unpoked one
     #[arg(help_heading = "Scene and time", long, value_name = "SEED", conflicts_with_all = ["picture", "record"])]
@@ -189,10 +192,10 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         ..Trial::new(scene, settings.clone())
     };
     let found = trial.run(&mut |world| {
-        if world.step_index == 0 {
+        if world.step_index() == 0 {
             note(&size_note(world).unwrap_or_default());
         }
-        bar.step(world.step_index as usize, scene.steps as usize, "steps");
+        bar.step(world.step_index() as usize, scene.steps as usize, "steps");
         sheets.add(world, scene)
     })?;
     drop(bar);
@@ -236,7 +239,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
 /// The settings of a solver with the order and lanes of the command. Errors: natural order in lanes.
 pub(super) fn settings(args: &RunArgs, own: Settings) -> Result<Settings, Error> {
     let continuous = args.continuous.unwrap_or(own.continuous);
-    let own = Settings { continuous, threads: args.threads, ..own };
+    let own = Settings { continuous, threads: args.threads, sleep: args.sleep, ..own };
     let order = args.order;
     let own = match (order, args.lanes) {
         (Order::Colored, Some(width)) => own.exactly(width),
@@ -419,10 +422,10 @@ fn head(world: &World, scene: &Scene) -> String {
 }
 
 fn counts(world: &World) -> String {
-    let c = &world.counts;
+    let c = world.counts();
     format!(
         "\nlast step: {} pairs, {} contacts, {} points, {} rows, {} sweeps, {} colors, {} overflowing, \
-         {:.0} % of lanes filled, {} bytes of records, {} visits of impacts, {} islands cut off, {} groups of islands, {} threads\n",
+         {:.0} % of lanes filled, {} bytes of records, {} visits of impacts, {} islands cut off, {} groups of islands, {} bodies asleep, {} threads\n",
         c.pairs,
         c.contacts,
         c.points,
@@ -435,6 +438,7 @@ fn counts(world: &World) -> String {
         c.impact_visits,
         c.cut_impacts,
         c.groups,
+        c.asleep,
         world.settings.threads.max(1)
     )
 }

@@ -41,7 +41,7 @@ impl Sheets {
     /// Observes the world at its start and after every step, and writes what is due. Errors: a file cannot be
     /// written.
     pub fn add(&mut self, world: &World, scene: &Scene) -> Result<(), Error> {
-        let (step, last) = (world.step_index, u64::from(scene.steps));
+        let (step, last) = (world.step_index(), u64::from(scene.steps));
         let due = |step: u64| self.every.map_or(step == last, |every| step.is_multiple_of(u64::from(every)));
         if let Some(sheet) = &mut self.state {
             let new = || Angles::new(world, scene.bodies.iter().map(|b| b.angle));
@@ -107,12 +107,12 @@ impl CsvFile {
 /// Writes a line per body: origin, angle including whole turns since the start, velocity of the center of
 /// mass.
 fn write_state(sheet: &mut CsvFile, world: &World, angles: &Angles, dt: f64) -> Result<(), Error> {
-    let time = world.step_index as f64 * dt;
+    let time = world.step_index() as f64 * dt;
     for i in 0..world.bodies.len() {
         let (origin, velocity) = (world.bodies.origin(i), world.bodies.velocity(i));
         let omega = world.bodies.angular_velocity[i];
         let pose = (origin[0], origin[1], angles.of(i));
-        sheet.row((world.step_index, time, i, pose, velocity.x, velocity.y, omega))?;
+        sheet.row((world.step_index(), time, i, pose, velocity.x, velocity.y, omega))?;
     }
     Ok(())
 }
@@ -124,7 +124,7 @@ fn write_contacts(sheet: &mut CsvFile, world: &World, starts: &[glam::Vec2]) -> 
         let normal = contact.manifold.normal;
         for (point, impulse) in contact.manifold.points().iter().zip(contact.step_impulse) {
             let at = starts[contact.body_b as usize] + point.anchor_b;
-            let names = (world.step_index, contact.body_a, contact.body_b, point.feature_id);
+            let names = (world.step_index(), contact.body_a, contact.body_b, point.feature_id);
             let geometry = (at.x, at.y, normal.x, normal.y, point.separation);
             sheet.row((names, geometry, impulse))?;
         }
@@ -139,7 +139,7 @@ const ROWS_OF_LINE: usize = 9;
 /// Writes a line per joint.
 fn write_joints(sheet: &mut CsvFile, world: &World) -> Result<(), Error> {
     let mut lines: BTreeMap<usize, [Option<f32>; ROWS_OF_LINE]> = BTreeMap::new();
-    for SolvedBlock { joint, block, step_impulses } in world.solved_blocks() {
+    for SolvedBlock { joint, block, step_impulses, .. } in world.solved_blocks() {
         let Some(joint) = joint else { continue };
         let impulses = lines.entry(joint.index()).or_default();
         for (j, impulse) in block.jacobians.iter().zip(step_impulses).take(block.size) {
@@ -158,7 +158,7 @@ fn write_joints(sheet: &mut CsvFile, world: &World) -> Result<(), Error> {
     for (handle, joint) in world.joints() {
         let state = world.joint_state(handle)?;
         let impulses = lines.get(&handle.index()).copied().unwrap_or_default();
-        let names = (world.step_index, handle.index(), joint.kind.name(), joint.a.index(), joint.b.index());
+        let names = (world.step_index(), handle.index(), joint.kind.name(), joint.a.index(), joint.b.index());
         let errors = (state.gap, state.lean, state.angle, state.translation, state.excess);
         sheet.row((names, errors, impulses, state.load(), state.breaks))?;
     }

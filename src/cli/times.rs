@@ -36,10 +36,10 @@ impl Times {
         let mut world: World = scene.build(Settings { timed: true, ..settings.clone() })?;
         for _ in 0..scene.steps {
             world.step().map_err(|d| Error::invalid("time", d.to_string()))?;
-            for (times, &ns) in phases.iter_mut().zip(&world.timings.phase_ns) {
+            for (times, &ns) in phases.iter_mut().zip(&world.timings().phase_ns) {
                 times.push(ns as f64);
             }
-            counts.push(world.counts);
+            counts.push(*world.counts());
         }
         let passes = if start.elapsed() * PASSES > PATIENCE { 1 } else { PASSES };
         let sample = time_in_turns(scene, &[settings], scene.steps, passes, 1)?.pop();

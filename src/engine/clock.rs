@@ -78,11 +78,12 @@ impl Phase {
 /// world.add_body(&BodyDef::dynamic([0.0, 0.5]).with(ShapeDef::circle(0.5)?))?;
 /// world.step()?;
 /// for phase in Phase::ALL {
-///     println!("{:<12} {} ns", phase.name(), world.timings.phase_ns[phase as usize]);
+///     println!("{:<12} {} ns", phase.name(), world.timings().phase_ns[phase as usize]);
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default)]
+#[non_exhaustive]
 pub struct Timings {
     /// Nanoseconds per phase, indexed by `Phase as usize`.
     pub phase_ns: [u64; Phase::ALL.len()],

@@ -50,7 +50,7 @@ impl Pokes {
             bodies: reaches.filter(|&(i, _)| world.bodies.is_dynamic(i)).collect(),
             gravity: gravity(world),
             dt: f64::from(world.settings.dt),
-            next: world.step_index,
+            next: world.step_index(),
             end,
             given: 0,
         };
@@ -70,7 +70,7 @@ impl Pokes {
 
     /// Gives the push that is due before the next step of `world`, if there is one. A body that was removed is spared.
     pub fn act(&mut self, world: &mut World) -> Result<(), Error> {
-        if world.step_index < self.next || world.step_index >= self.end || self.bodies.is_empty() {
+        if world.step_index() < self.next || world.step_index() >= self.end || self.bodies.is_empty() {
             return Ok(());
         }
         let (body, reach) = self.bodies[self.random.random_range(0..self.bodies.len())];

@@ -175,12 +175,12 @@ mod tests {
         let mut seen = Vec::new();
         let trial = Trial { steps: 5, measured: 2, ..Trial::of(&mut loaded, settings()) };
         let found = trial.run(&mut |world| {
-            seen.push(world.step_index);
+            seen.push(world.step_index());
             Ok(())
         });
         let found = found.unwrap();
         assert_eq!((seen, found.errors.unwrap().steps), (vec![0, 1, 2, 3, 4, 5], 2));
-        let stop = |world: &World| match world.step_index {
+        let stop = |world: &World| match world.step_index() {
             3 => Err(Error::invalid("disk", "full")),
             _ => Ok(()),
         };
@@ -195,6 +195,6 @@ mod tests {
         let trial = Trial { demands, until_broken: true, ..Trial::new(&loaded.scene, settings()) };
         let found = trial.run(&mut |_| Ok(())).unwrap();
         let broken = found.broken.unwrap();
-        assert_eq!((broken.mark, broken.body, broken.step), (Mark::Slid, Some(1), found.world.step_index));
+        assert_eq!((broken.mark, broken.body, broken.step), (Mark::Slid, Some(1), found.world.step_index()));
     }
 }

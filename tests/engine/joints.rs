@@ -351,6 +351,66 @@ fn a_world_with_joints_is_saved_and_goes_on_with_the_same_bits() {
     assert!(read.joint(joints[4]).is_err() && read.joint(joints[3]).is_ok());
 }
 
+#[test]
+#[cfg(feature = "lab")]
+fn a_tight_chain_on_a_contact_goes_on_with_the_same_bits_and_through_changes_of_others() {
+    let mut settings = Settings::new(find("shim").unwrap());
+    settings.budget.substeps = 2;
+    let mut world = World::new(settings);
+    let ground = world.add_body(&BodyDef::fixed([0.0, 0.0])).unwrap();
+    chain(&mut world, ground, 12, 6.0);
+    let post = ShapeDef::rectangle(1.0, 1.0).unwrap();
+    world.add_body(&BodyDef::fixed([5.0, 18.5]).with(post)).unwrap();
+    let more: Vec<_> = (0..3).map(|i| (i, chain(&mut world, ground, 2 + i, 0.5))).collect();
+    (0..60).for_each(|_| world.step().unwrap());
+    more.iter().for_each(|(i, joints)| world.remove_joint(joints[1 + i % 2]).unwrap());
+    let text = serde_json::to_string(&world).unwrap();
+    let mut read: World = serde_json::from_str(&text).unwrap();
+    for i in 0..120 {
+        if i % 40 == 0 {
+            for world in [&mut world, &mut read] {
+                chain(world, ground, 3, 0.5);
+            }
+        }
+        world.step().unwrap();
+        read.step().unwrap();
+        assert_eq!(read.state_hash(), world.state_hash(), "step {i}");
+    }
+    let set = |of_solver: &[f64]| {
+        let mut value: serde_json::Value = serde_json::from_str(&text).unwrap();
+        value["of_solver"] = of_solver.into();
+        serde_json::from_value::<World>(value)
+    };
+    for bad in [&[1.0][..], &[0.0, 1.0], &[0.0, 1.0, 1e300, 0.0], &[-1.0, 0.0, 1.0], &[1e300]] {
+        let error = set(bad).unwrap_err().to_string();
+        assert!(error.contains("of_solver: are not numbers of shim"), "{bad:?}: {error}");
+    }
+    // Bodies that there are not.
+    set(&[2.0, 1e9, -3.5, 1e9, 1.0, 1.0]).unwrap().step().unwrap();
+}
+
+/// The same bodies, but other rows.
+#[test]
+fn a_hinge_becomes_a_weld() {
+    let (mut world, ground) = empty(find("shim").unwrap());
+    let bar = || ShapeDef::rectangle(0.5, 0.1).unwrap();
+    let joints = [[0.0, 5.0], [9.0, 5.0], [0.0, 9.0]].map(|[x, y]| {
+        let bar = world.add_body(&BodyDef::dynamic([x, y]).with(bar())).unwrap();
+        let hinge = Joint::revolute(ground, bar).anchor([x - 0.5, y]);
+        (world.add_joint(&hinge).unwrap(), Joint::weld(ground, bar).anchor([x - 0.5, y]), bar)
+    });
+    for (joint, weld, _) in joints.iter().rev() {
+        world.step().unwrap();
+        world.set_joint(*joint, weld).unwrap();
+    }
+    let angles = |world: &World| joints.each_ref().map(|(.., bar)| world.body(*bar).unwrap().angle());
+    let before = angles(&world);
+    (0..60).for_each(|_| world.step().unwrap());
+    for (now, before) in angles(&world).iter().zip(before) {
+        assert!((now - before).abs() < 1e-3, "{now} rad, not {before}");
+    }
+}
+
 /// A heavy chain, which `shim` solves directly, next to a loop of rods and a free pair, which it solves by
 /// sweeps. All joints are plain hinges.
 fn chain_beside_loop(width: LaneWidth) -> (World, Vec<JointHandle>) {
@@ -667,7 +727,7 @@ fn a_pendulum_on_the_ground_does_not_matter_to_what_lands_there() {
         }
         let step = |_| {
             world.step().unwrap();
-            world.counts.impact_visits
+            world.counts().impact_visits
         };
         (0..100).map(step).sum::<usize>()
     };

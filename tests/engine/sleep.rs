@@ -51,11 +51,11 @@ fn what_rests_sleeps_and_stays() {
     for variant in local() {
         let (mut world, bodies) = stacks(sleeping(variant));
         run(&mut world, 150);
-        assert_eq!((asleep(&world), world.counts.asleep), (6, 6), "{}", variant.name);
+        assert_eq!((asleep(&world), world.counts().asleep), (6, 6), "{}", variant.name);
         let (hash, contacts) = (world.state_hash(), world.contacts.clone());
         run(&mut world, 60);
         assert_eq!((world.state_hash(), &world.contacts), (hash, &contacts), "{}", variant.name);
-        assert_eq!((world.step_index, world.counts.contacts, world.counts.sweeps), (210, 6, 0));
+        assert_eq!((world.step_index(), world.counts().contacts, world.counts().sweeps), (210, 6, 0));
         let top = world.body(bodies[4]).unwrap();
         assert!(
             (top.position()[1] - 2.5).abs() < 3.0 * f64::from(LINEAR_SLOP),
@@ -66,7 +66,7 @@ fn what_rests_sleeps_and_stays() {
         // Switched off, all are awake.
         world.settings.sleep = false;
         world.step().unwrap();
-        assert_eq!((asleep(&world), world.counts.asleep), (0, 0));
+        assert_eq!((asleep(&world), world.counts().asleep), (0, 0));
     }
     let mut world = World::new(sleeping(solvers::find("nncg").unwrap()));
     let error = world.step().unwrap_err().to_string();
@@ -211,7 +211,7 @@ fn bodies_that_are_awake_have_the_same_bits() {
             for _ in 0..150 {
                 slept.step().unwrap();
                 awake.step().unwrap();
-                most = most.max(slept.counts.asleep);
+                most = most.max(slept.counts().asleep);
                 for i in (0..slept.bodies.len()).filter(|&i| slept.bodies.is_dynamic(i)) {
                     if slept.body(slept.handle(i).unwrap()).unwrap().is_asleep() || (2..8).contains(&i) {
                         continue;
@@ -244,10 +244,15 @@ fn a_saved_or_cloned_world_sleeps_on() {
                 for world in [&mut world, &mut saved, &mut cloned] {
                     world.step().unwrap();
                 }
-                let hashes = [&saved, &cloned].map(|other| (other.state_hash(), other.counts.asleep));
-                assert_eq!(hashes, [(world.state_hash(), world.counts.asleep); 2], "{} {step}", variant.name);
+                let hashes = [&saved, &cloned].map(|other| (other.state_hash(), other.counts().asleep));
+                assert_eq!(
+                    hashes,
+                    [(world.state_hash(), world.counts().asleep); 2],
+                    "{} {step}",
+                    variant.name
+                );
             }
-            assert_eq!(world.counts.asleep, 6);
+            assert_eq!(world.counts().asleep, 6);
         }
     }
 }
@@ -285,7 +290,7 @@ fn nothing_hovers_whatever_is_done(
             }
             for _ in 0..60 {
                 world.step().unwrap();
-                most = most.max(world.counts.asleep);
+                most = most.max(world.counts().asleep);
                 let sleeps = |i: usize| world.handle(i).is_some_and(|body| world.body(body).unwrap().is_asleep());
                 let joints = world.joints().map(|(_, joint)| [joint.a.index(), joint.b.index()]);
                 let pairs: Vec<[usize; 2]> =

@@ -88,7 +88,7 @@ fn a_solver_from_outside_holds_a_stack_with_the_sweeps_that_it_needs() {
     let mut sweeps = Vec::new();
     for _ in 0..120 {
         world.step().unwrap();
-        sweeps.push(world.counts.sweeps);
+        sweeps.push(world.counts().sweeps);
     }
     for i in 0..5 {
         let height = world.bodies.position_y[i + 1];
@@ -119,7 +119,7 @@ fn its_parameter_is_set_by_name() {
     loose.settings.solver.set(&mut loose.settings.parameters, "tolerance", 100.0).unwrap();
     strict.step().unwrap();
     loose.step().unwrap();
-    assert_eq!((strict.counts.sweeps, loose.counts.sweeps), (64, 1));
+    assert_eq!((strict.counts().sweeps, loose.counts().sweeps), (64, 1));
     let refused = ADAPTIVE.set(&mut strict.settings.parameters, "tolerance", -1.0).unwrap_err();
     assert!(refused.to_string().contains("-1"), "{refused}");
 }

@@ -257,7 +257,7 @@ fn rods_are_in_the_passes_and_colors_of_the_contacts() {
     let (mut world, seen) = chain(find("soft_step").unwrap(), LaneWidth::W8, Order::Colored);
     world.step().unwrap();
     // Six discs on the ground, and five rods in two colors.
-    assert_eq!((world.counts.contacts, world.counts.colors, world.counts.overflow), (6, 3, 0));
+    assert_eq!((world.counts().contacts, world.counts().colors, world.counts().overflow), (6, 3, 0));
     let of = |phase: Phase| -> usize {
         seen.lock().unwrap().iter().filter(|(p, _)| *p == phase).map(|(_, rods)| rods).sum()
     };

@@ -85,9 +85,63 @@ fn settings_out_of_range_are_refused_with_their_field_and_change_nothing() {
             assert_eq!(world.step().unwrap_err().to_string(), *message);
         }
         world.settings = good;
-        assert_eq!((world.state_hash(), world.step_index), (hash, 1), "{}", variant.name);
+        assert_eq!((world.state_hash(), world.step_index()), (hash, 1), "{}", variant.name);
         world.step().unwrap_or_else(|e| panic!("{}: {e}", variant.name));
     }
+}
+
+/// A pile of boxes that has begun to fall.
+fn pile(settings: Settings) -> World {
+    let mut world = World::new(settings);
+    ground(&mut world);
+    for i in 0..40 {
+        let (x, y) = (1.3 * f64::from(i % 5), 0.6 + 1.1 * f64::from(i / 5));
+        world.add_body(&unit_box([x, y]).with_angle(0.1 * f64::from(i))).unwrap();
+    }
+    (0..30).for_each(|_| world.step().unwrap());
+    world
+}
+
+#[test]
+fn another_broad_phase_finds_the_same_contacts_from_the_next_step_on() {
+    for kinds in [BroadPhaseKind::ALL, [BroadPhaseKind::Tree, BroadPhaseKind::HashGrid]] {
+        let mut still = pile(Settings { broadphase: kinds[0], ..Settings::default() });
+        let mut changing = still.clone();
+        for i in 0..60 {
+            changing.settings.broadphase = kinds[(i / 10 + 1) % 2];
+            still.step().unwrap();
+            changing.step().unwrap();
+            assert_eq!((changing.state_hash(), changing.counts()), (still.state_hash(), still.counts()));
+        }
+    }
+}
+
+#[test]
+#[cfg(feature = "lab")]
+fn another_length_unit_takes_effect_as_in_a_new_world() {
+    let mut changed = pile(Settings::new(solvers::SOFT_STEP));
+    for unit in [8.0, 0.25] {
+        changed.settings.length_unit = unit;
+        let mut new: World = serde_json::from_str(&serde_json::to_string(&changed).unwrap()).unwrap();
+        for _ in 0..30 {
+            assert_eq!(changed.step(), new.step());
+            assert_eq!((changed.state_hash(), changed.counts()), (new.state_hash(), new.counts()));
+        }
+    }
+}
+
+#[test]
+fn events_end_and_begin_with_their_setting() {
+    let mut world = pile(Settings { contact_events: true, ..Settings::default() });
+    let begun = |world: &World| {
+        world.contact_events().iter().filter(|event| matches!(event, ContactEvent::Begin { .. })).count()
+    };
+    world.settings.contact_events = false;
+    world.step().unwrap();
+    assert_eq!(world.contact_events(), []);
+    world.settings.contact_events = true;
+    world.step().unwrap();
+    assert_eq!(begun(&world), world.contacts.len());
 }
 
 #[test]

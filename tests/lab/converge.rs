@@ -344,7 +344,7 @@ fn a_replayed_problem_is_the_step_of_the_world() {
         let Replayed { velocities, sweeps, .. } =
             replay(&problem, sequence, variant).run(variant, budget, Start::Warm);
         world.frozen_step();
-        assert_eq!(sweeps, world.counts.sweeps);
+        assert_eq!(sweeps, world.counts().sweeps);
         let kinds = (0..world.bodies.len()).map(|i| world.bodies.kind(i)).collect::<Vec<_>>();
         let moving = (0..kinds.len()).filter(|&i| kinds[i] != BodyKind::Static);
         let rows = &world.workspace().rows;

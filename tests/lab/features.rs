@@ -55,8 +55,8 @@ fn the_specialized_and_the_full_kernel_give_the_same_bits() {
                 full.step().unwrap();
                 assert_eq!(special.state_hash(), full.state_hash(), "{name} {} step {step}", variant.name);
             }
-            assert!(special.counts.contacts > 4, "{name}: only {} contacts", special.counts.contacts);
-            let bytes = (special.counts.constraint_bytes, full.counts.constraint_bytes);
+            assert!(special.counts().contacts > 4, "{name}: only {} contacts", special.counts().contacts);
+            let bytes = (special.counts().constraint_bytes, full.counts().constraint_bytes);
             // Restitution alone adds nothing: impacts before the step have no records.
             let needs = special.features();
             let has_all = needs.rotation && needs.friction && needs.two_points;

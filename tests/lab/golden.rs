@@ -39,7 +39,7 @@ fn hash_of(scene: &scenes::Scene, variant: &'static Variant) -> u64 {
             break;
         }
     }
-    fold(world.state_hash(), world.step_index)
+    fold(world.state_hash(), world.step_index())
 }
 
 /// One line per solver over all scenes without joints, one per solver that supports joints over all scenes

@@ -106,7 +106,7 @@ fn impacts_of_a_step_stay_within_their_bound() {
                 if world.step().is_err() {
                     break;
                 }
-                let counts = world.counts;
+                let counts = *world.counts();
                 let bound = 144 * dynamic + 4 * counts.points;
                 assert!(counts.impact_visits <= bound, "{} {number}: {counts:?}", family.name);
                 most = most.max(counts.impact_visits);

@@ -78,11 +78,11 @@ fn every_division_into_groups_gives_the_same_bits() {
                 let mut most_groups = 0;
                 for _ in 0..steps {
                     world.step().unwrap();
-                    most_groups = most_groups.max(world.counts.groups);
+                    most_groups = most_groups.max(world.counts().groups);
                 }
                 assert_eq!(most_groups > 0, group_size > 0, "{name} under {}", variant.name);
                 let contacts: Vec<Vec<u8>> = world.contacts.iter().map(|c| bytes_of(c).to_vec()).collect();
-                (world.state_hash(), contacts, world.counts.sweeps)
+                (world.state_hash(), contacts, world.counts().sweeps)
             };
             let whole = run(0, 1);
             for (group_size, threads) in [(1, 1), (2, 3), (most, 1), (most, 2)] {

@@ -74,9 +74,9 @@ fn the_order_of_constraints_does_change_the_bits() {
 #[test]
 fn a_crowded_plate_runs_out_of_colors() {
     let world = run(&scenes::load("pyramid:4").unwrap().scene, named("soft_step"), 1);
-    assert_eq!(world.counts.overflow, 0);
+    assert_eq!(world.counts().overflow, 0);
     let world = run(&crate::common::scene("crowded_plate"), named("soft_step"), 60);
-    assert!(world.counts.overflow > 0, "{:?}", world.counts);
+    assert!(world.counts().overflow > 0, "{:?}", world.counts());
 }
 
 #[test]

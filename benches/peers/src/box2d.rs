@@ -37,7 +37,8 @@ impl Box2d {
             def.gravity = vector(scene.gravity);
             def.enableSleep = false;
             def.enableContinuous = contender.continuous;
-            def.workerCount = 1;
+            // With several, the library uses a scheduler of its own.
+            def.workerCount = contender.threads as i32;
             def.contactHertz = contender.hertz;
             let world = b2CreateWorld(&def);
             if !b2World_IsValid(world) {

@@ -109,7 +109,7 @@ impl Checker {
         }
         // Observers count steps from the start of the scene's full length. A shorter run is aligned at its
         // end.
-        self.mirror.step_index = self.steps - u64::from(left);
+        self.mirror.set_step_index(self.steps - u64::from(left));
         if let Some(truth) = &mut self.truth {
             truth.observer.observe(&self.mirror);
         }

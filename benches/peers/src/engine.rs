@@ -7,7 +7,7 @@ use simpulse::engine::broadphase::BroadPhaseKind;
 use simpulse::engine::lanes::{LaneWidth, native_width};
 use simpulse::lab::scenes::Scene;
 
-/// A scene inside an engine: one thread, no sleeping.
+/// A scene inside an engine, without sleeping.
 pub trait Engine {
     /// Advances by the scene's step. Errors: the engine reports that it diverged.
     fn step(&mut self) -> Result<(), String>;
@@ -61,17 +61,19 @@ pub struct Contender {
     pub recycling: bool,
     /// Whether continuous collision is on.
     pub continuous: bool,
+    /// Threads. rapier has them with the feature `parallel` of this program.
+    pub threads: usize,
 }
 
 impl Contender {
     /// An engine with this number of substeps and otherwise at its defaults, but for continuous collision.
     pub const fn new(maker: Maker, substeps: u32, continuous: bool) -> Self {
-        Contender { maker, substeps, hertz: 30.0, recycling: true, continuous }
+        Contender { maker, substeps, hertz: 30.0, recycling: true, continuous, threads: 1 }
     }
 
     /// Whether this is an engine at its defaults in the race.
     pub fn is_default(&self) -> bool {
-        *self == Contender::new(self.maker, 4, false)
+        *self == Contender { threads: self.threads, ..Contender::new(self.maker, 4, false) }
     }
 
     /// Builds the scene in the engine. Errors: a part of the scene that the engine does not support.
@@ -98,14 +100,20 @@ impl Contender {
     pub fn setting(&self) -> String {
         let against_static = if self.hertz == 30.0 { String::new() } else { format!(", {} Hz", self.hertz) };
         let anew = if self.recycling { "" } else { ", no recycling" };
-        format!("n = {}{against_static}{anew}", self.substeps)
+        let threads = match (self.threads, self.maker) {
+            (1, _) => String::new(),
+            (_, Maker::Rapier) if cfg!(not(feature = "parallel")) => ", 1 thread".into(),
+            (threads, _) => format!(", {threads} threads"),
+        };
+        format!("n = {}{against_static}{anew}{threads}", self.substeps)
     }
 }
 
 /// All contenders: every engine at its defaults (n = 4) and, unless `quick`, at 2 and 8 substeps, and at 8 and 14
 /// substeps with contacts of 60 and 105 Hz, the stiffest that Box2D's clamp allows there. The other widths and
-/// broad phase of this crate run too, and the other engines without contact recycling.
-pub fn contenders(quick: bool) -> Vec<Contender> {
+/// broad phase of this crate run too, and the other engines without contact recycling. With several `threads` each also runs
+/// with one at its defaults.
+pub fn contenders(quick: bool, threads: usize) -> Vec<Contender> {
     let ours = |width| Maker::Simpulse(width, BroadPhaseKind::default());
     let native = native_width();
     let default = [(4, 30.0)];
@@ -134,5 +142,10 @@ pub fn contenders(quick: bool) -> Vec<Contender> {
     }
     let anew = |maker| Contender { recycling: false, ..Contender::new(maker, 4, false) };
     all.extend([Maker::Box2d, Maker::Rapier].map(anew));
+    if threads > 1 {
+        let alone: Vec<Contender> = all.iter().filter(|contender| contender.is_default()).copied().collect();
+        all.iter_mut().for_each(|contender| contender.threads = threads);
+        all.extend(alone);
+    }
     all
 }

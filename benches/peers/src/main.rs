@@ -1,7 +1,7 @@
 //! The same scenes on Box2D, rapier and simpulse, interleaved in one process:
 //! `cargo run --profile peers -p peers`.
 //!
-//! One thread, no sleeping, no continuous collision. Every engine runs at its defaults and at other settings.
+//! One thread or `--threads`, no sleeping, no continuous collision. Every engine runs at its defaults and at other settings.
 //! One [`check`] computes its errors from body poses, and its time is reported only if the check passed. A
 //! block of steps of one engine is followed by a block of the next. Ratios are of whole runs, from the first
 //! step to the last; the longest step is printed next to them.
@@ -66,6 +66,9 @@ struct Args {
     /// Default settings only, 180 steps
     #[arg(long)]
     quick: bool,
+    /// Threads of every engine; rapier needs `--features parallel`, which makes it slower with one
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=32))]
+    threads: u64,
     /// Random seed of scenes that have one
     #[arg(long)]
     seed: Option<u64>,
@@ -115,7 +118,8 @@ fn run(args: &Args) -> Result<(), String> {
         // Any other scene of the catalog may fall.
         names => names.iter().map(|name| row(name).unwrap_or((name, 300, false))).collect(),
     };
-    let contenders = engine::contenders(args.quick);
+    rapier::set_threads(args.threads as usize)?;
+    let contenders = engine::contenders(args.quick, args.threads as usize);
     std::fs::create_dir_all(&args.out).map_err(|e| format!("{}: {e}", args.out.display()))?;
     let mut csv = csv::Writer::from_path(&path).map_err(failed)?;
     let mut summary = vec![table::SUMMARY.to_string()];

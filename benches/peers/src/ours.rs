@@ -14,7 +14,8 @@ impl Simpulse {
     pub fn new(scene: &Scene, contender: &Contender) -> Result<Self, String> {
         let name = if let Maker::Solver(name) = contender.maker { name } else { "soft_step" };
         let solver = solvers::find(name).map_err(|e| e.to_string())?;
-        let mut settings = Settings { continuous: contender.continuous, ..Settings::new(solver) };
+        let Contender { continuous, threads, .. } = *contender;
+        let mut settings = Settings { continuous, threads, ..Settings::new(solver) };
         settings.budget.substeps = contender.substeps;
         if let Maker::Simpulse(width, broadphase) = contender.maker {
             settings = Settings { broadphase, ..settings.exactly(width) };
@@ -45,6 +46,6 @@ impl Engine for Simpulse {
     }
 
     fn points(&self) -> usize {
-        self.0.counts.points
+        self.0.counts().points
     }
 }

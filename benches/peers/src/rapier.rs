@@ -13,6 +13,14 @@ pub struct Rapier {
     bodies: Vec<RigidBodyHandle>,
 }
 
+/// Starts the threads of all worlds. Errors: the system does not give them.
+pub fn set_threads(threads: usize) -> Result<(), String> {
+    #[cfg(feature = "parallel")]
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(|e| e.to_string())?;
+    let _ = threads;
+    Ok(())
+}
+
 impl Rapier {
     /// Errors: a shape or a joint that rapier does not support.
     pub fn new(scene: &Scene, contender: &Contender) -> Result<Self, String> {

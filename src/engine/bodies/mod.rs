@@ -44,6 +44,9 @@ impl BodyHandle {
 }
 
 /// State of all bodies, one array per quantity, `[len]` each.
+///
+/// The next step of a [`World`](crate::world::World) uses what is written. Velocities of static bodies, and inverse masses and
+/// inertias of all but dynamic ones, must stay zero.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Bodies {
@@ -70,14 +73,14 @@ pub struct Bodies {
     pub inv_mass: LaneVec,
     /// Inverse inertia (1/(kg·m²)), zero for static and kinematic bodies.
     pub inv_inertia: LaneVec,
-    /// Force applied in every step until it is changed, x (N). For a single step:
+    /// Force applied to a dynamic body in every step until it is changed, x (N). For a single step:
     /// [`World::apply_force`](crate::world::World::apply_force).
     pub force_x: LaneVec,
-    /// Force applied in every step until it is changed, y (N).
+    /// As `force_x`, y (N).
     pub force_y: LaneVec,
-    /// Torque applied in every step until it is changed (N·m).
+    /// Torque applied to a dynamic body in every step until it is changed (N·m).
     pub torque: LaneVec,
-    /// Factor on gravity (1).
+    /// Factor on gravity (1); this and damping act on dynamic bodies.
     pub gravity_scale: LaneVec,
     /// Linear damping (1/s).
     pub linear_damping: LaneVec,
@@ -89,7 +92,7 @@ pub struct Bodies {
     pub(crate) kind: Vec<BodyKind>,
     /// Collision group of each body; 0 is none.
     pub(crate) group: Vec<i32>,
-    /// Whether dynamic bodies also stop it in continuous collision.
+    /// Whether dynamic bodies also stop it in continuous collision; without effect on others.
     pub bullet: Vec<bool>,
     /// Whether a body consists of discs about its center of mass, so that rotating it moves no contact.
     pub(crate) round: Vec<bool>,

@@ -120,6 +120,11 @@ impl Seams {
         self.starts.is_empty()
     }
 
+    /// Whether a shape shares a corner.
+    pub fn has(&self, shape: u32) -> bool {
+        !self.of(shape).is_empty()
+    }
+
     /// The seams of a shape.
     fn of(&self, shape: u32) -> &[Seam] {
         match self.starts.get(shape as usize..shape as usize + 2) {

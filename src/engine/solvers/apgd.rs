@@ -75,10 +75,11 @@ impl Solver for Apgd {
         vec![self.steepness]
     }
 
-    fn set_kept(&mut self, kept: &[f64]) {
+    fn set_kept(&mut self, kept: &[f64]) -> bool {
         if let &[steepness] = kept {
-            self.steepness = steepness.max(0.0);
+            self.steepness = steepness;
         }
+        matches!(kept, []) || matches!(kept, [steepness] if *steepness >= 0.0)
     }
 }
 

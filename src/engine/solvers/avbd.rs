@@ -150,8 +150,8 @@ impl Solver for Avbd {
         self.descent.joints.kept()
     }
 
-    fn set_kept(&mut self, kept: &[f64]) {
-        self.descent.joints.set_kept(kept);
+    fn set_kept(&mut self, kept: &[f64]) -> bool {
+        self.descent.joints.set_kept(kept)
     }
 }
 

@@ -135,6 +135,7 @@ pub struct Uses {
 
 /// A property that tests check for every solver, unless its row declares an exception.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Guarantee {
     /// All lane widths give the same bits.
     SameBits,

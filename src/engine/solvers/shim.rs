@@ -144,6 +144,27 @@ impl Solver for Shim {
         }
     }
 
+    /// The number of jammed bodies and these bodies; then the numbers of chains.
+    fn kept(&self) -> Vec<f64> {
+        let jammed: Vec<f64> = self.jams.kept().map(f64::from).collect();
+        std::iter::once(jammed.len() as f64)
+            .chain(jammed)
+            .chain(self.chains.kept().into_flattened())
+            .collect()
+    }
+
+    fn set_kept(&mut self, kept: &[f64]) -> bool {
+        let Some((&count, rest)) = kept.split_first() else { return true };
+        if !rest.iter().all(|&x| (x as f32).is_finite()) {
+            return false;
+        }
+        let Some((jammed, chains)) = rest.split_at_checked(count as usize) else { return false };
+        let (chains, rest) = chains.as_chunks();
+        self.jams.set_kept(jammed.iter().map(|&body| body as u32));
+        self.chains.set_kept(chains.to_vec());
+        rest.is_empty()
+    }
+
     fn step(&mut self, passes: &mut Passes<'_>) {
         let [stiffness, damping_ratio, push_speed] = [0, 1, 2].map(|i| passes.parameter(i));
         let frequencies = angular_frequencies(f32::INFINITY, stiffness, passes.h());

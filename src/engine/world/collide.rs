@@ -2,7 +2,6 @@
 
 use super::World;
 use super::sleep::Sleep;
-use crate::bodies::BodyKind;
 use crate::constraints::Solver;
 use crate::constraints::step::{Collision, CollisionScene};
 use crate::contacts::Contact;
@@ -21,6 +20,8 @@ pub(super) struct Narrow {
     /// Candidates, sorted by shape pair.
     pub candidates: Vec<Candidate>,
     pub last_candidates: Vec<Candidate>,
+    /// Candidates of shapes with seams.
+    pub on_seams: Vec<u32>,
     /// Candidates by [`PairKind`].
     pub of_kind: [Vec<u32>; PairKind::ALL.len()],
     /// Shapes as the lane kernels read them.
@@ -106,15 +107,6 @@ impl World {
         let mut asked = Collision::default();
         self.with_scene(|solver, scene| solver.before_collision(scene, &mut asked));
         let narrow = &mut self.narrow;
-        let margins = Margins::of(self.settings.length_unit);
-        if std::mem::take(&mut self.seams_are_stale) {
-            let ground = |shape: usize| {
-                let body = self.shape_body[shape] as usize;
-                let is_ground = self.bodies.kind[body] == BodyKind::Static && self.slots.lives[body];
-                is_ground.then(|| self.broadphase.space_of(shape as u32))
-            };
-            self.seams.build(&self.bodies, &self.shapes, &self.shape_body, ground, margins);
-        }
         // `displacements` covers more than a step.
         let rolling = asked.rolling.map(|Rolling { limit }| Rolling { limit: AHEAD * limit });
         narrow.fresh.clear();
@@ -186,15 +178,15 @@ impl World {
         let margins = Margins::of(self.settings.length_unit);
         let is_looked_at = |bodies| !self.sleep.any() || self.sleep.is_active(bodies);
         let mut points = 0;
-        for candidate in &mut self.narrow.candidates {
-            if candidate.contact & FRESH != 0 || !is_looked_at(candidate.bodies) {
-                continue;
-            }
-            let contact = &self.contacts[candidate.contact as usize];
+        let Narrow { candidates, on_seams, is_changed, .. } = &mut self.narrow;
+        for &name in &*on_seams {
+            let candidate = &mut candidates[name as usize];
+            let contact = self.contacts.get(candidate.contact as usize);
+            let Some(contact) = contact.filter(|_| is_looked_at(candidate.bodies)) else { continue };
             if self.seams.is_ghost(contact, &self.bodies, &self.shapes, margins) {
                 points += contact.manifold.count as usize;
                 candidate.contact = NO_CONTACT;
-                self.narrow.is_changed = true;
+                *is_changed = true;
             }
         }
         points

@@ -6,6 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Counts of the last step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct StepCounts {
     /// Candidate pairs of the broad phase.
     pub pairs: usize,
@@ -46,6 +47,7 @@ pub struct StepCounts {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
+#[non_exhaustive]
 pub enum Quantity {
     /// Its speed (m/s).
     #[default]
@@ -62,6 +64,7 @@ pub enum Quantity {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
+#[non_exhaustive]
 pub enum Criterion {
     /// Speeds within bounds, finite positions and angles.
     #[default]
@@ -82,6 +85,7 @@ pub enum Criterion {
 /// # Ok::<(), simpulse_engine::error::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Divergence {
     /// Step number, from 1.
     pub step: u64,
@@ -95,6 +99,13 @@ pub struct Divergence {
     pub criterion: Criterion,
 }
 
+impl Divergence {
+    /// The divergence of body `body` in step `step`: the value of this quantity is `speed`.
+    pub fn new(step: u64, body: usize, quantity: Quantity, speed: f32, criterion: Criterion) -> Self {
+        Divergence { step, body, quantity, speed, criterion }
+    }
+}
+
 impl std::error::Error for Divergence {}
 
 /// Why a step failed.
@@ -106,6 +117,7 @@ impl std::error::Error for Divergence {}
 /// # Ok::<(), simpulse_engine::error::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum StepError {
     /// A setting out of its range; the world is unchanged.
     Settings(Error),

@@ -83,6 +83,14 @@ pub(super) struct Events {
     approach: Vec<(f32, DVec2)>,
 }
 
+impl Events {
+    /// Forgets the last step.
+    pub fn clear(&mut self) {
+        self.list.clear();
+        self.touching.clear();
+    }
+}
+
 impl World {
     /// Contact events of the last step: ends, begins and hits, in the order of shape pairs. Empty unless
     /// [`Settings::contact_events`](super::Settings::contact_events) is set.

@@ -16,6 +16,7 @@ use std::ops::Range;
 
 /// A block of rows of a joint after a step.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct SolvedBlock {
     /// The joint; `None` for a constraint of the caller's own type.
     pub joint: Option<JointHandle>,
@@ -50,7 +51,12 @@ pub(super) struct JointSlots {
 impl JointSlots {
     /// Whether a joint keeps two bodies from colliding.
     pub fn keeps_apart(&self, [a, b]: [u32; 2]) -> bool {
-        !self.apart.is_empty() && self.apart.contains(&[a.min(b), a.max(b)])
+        self.keeps_any_apart() && self.apart.contains(&[a.min(b), a.max(b)])
+    }
+
+    /// Whether joints keep any bodies from colliding.
+    pub fn keeps_any_apart(&self) -> bool {
+        !self.apart.is_empty()
     }
 
     fn remove(&mut self, index: usize) {
@@ -410,13 +416,14 @@ fn reference(kind: &JointKind) -> f64 {
 pub(super) struct SavedJoints {
     joints: Vec<Option<Joint>>,
     generation: Vec<u32>,
+    free: Vec<u32>,
     kept: Vec<(Vec<f32>, f32)>,
 }
 
 #[cfg(feature = "serde")]
 impl SavedJoints {
     pub fn of(world: &World) -> Self {
-        let JointSlots { joints, generation, places, .. } = &world.joints;
+        let JointSlots { joints, generation, free, places, .. } = &world.joints;
         let kept = places.iter().map(|place| match place {
             Some([group, i]) => {
                 let kind = &world.work.types[*group as usize].kind;
@@ -424,14 +431,24 @@ impl SavedJoints {
             }
             None => Default::default(),
         });
-        SavedJoints { joints: joints.clone(), generation: generation.clone(), kept: kept.collect() }
+        SavedJoints {
+            joints: joints.clone(),
+            generation: generation.clone(),
+            free: free.clone(),
+            kept: kept.collect(),
+        }
     }
 
     /// Errors: lists of different lengths, a body that does not exist, a value out of range.
     pub fn check(&self, bodies: usize) -> Result<(), String> {
-        let SavedJoints { joints, generation, kept } = self;
+        let SavedJoints { joints, generation, free, kept } = self;
         if generation.len() != joints.len() || kept.len() != joints.len() {
             return Err(format!("lists of joints have other lengths than {}", joints.len()));
+        }
+        let mut ascending = free.clone();
+        ascending.sort_unstable();
+        if !ascending.into_iter().eq((0..joints.len() as u32).filter(|&i| joints[i as usize].is_none())) {
+            return Err("free joints are not those that there are not".into());
         }
         for (i, joint) in joints.iter().enumerate() {
             let Some(joint) = joint else { continue };
@@ -445,9 +462,8 @@ impl SavedJoints {
 
     pub fn restore(self, world: &mut World) {
         let places = vec![None; self.joints.len()];
-        let free = self.joints.iter().enumerate().filter(|(_, joint)| joint.is_none()).map(|(i, _)| i as u32);
         world.joints = JointSlots {
-            free: free.collect(),
+            free: self.free,
             joints: vec![None; self.joints.len()],
             generation: self.generation,
             places,

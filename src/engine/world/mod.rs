@@ -5,7 +5,7 @@
 //! ```
 
 use crate::bodies::{Bodies, Filter};
-use crate::broadphase::{BroadPhase, FatBoxes, Proxy};
+use crate::broadphase::{BroadPhase, BroadPhaseKind, FatBoxes, Proxy};
 use crate::clock::{Clock, Phase, Timings};
 use crate::constraints::kernels::motion::{self, MotionInput};
 use crate::constraints::kernels::observe::ObservedRule;
@@ -105,7 +105,7 @@ struct Surface {
 /// ```
 #[derive(Clone)]
 pub struct World {
-    /// Body state.
+    /// Body state. The number of bodies changes by [`World::add_body`] only; a step with arrays of other lengths panics.
     pub bodies: Bodies,
     shapes: Vec<Shape>,
     shape_body: Vec<u32>,
@@ -113,20 +113,20 @@ pub struct World {
     filters: Vec<Filter>,
     /// Bodies whose velocity does not move them, see [`BodyDef::belt`](crate::bodies::BodyDef::belt).
     belts: Vec<u32>,
-    /// Contacts of the last step with at least one point, sorted by shape pair.
+    /// Contacts of the last step with at least one point, sorted by shape pair. The next step starts with the impulses that
+    /// are written here, or without any if the length changes; it finds everything else itself.
     pub contacts: Vec<Contact>,
-    /// Settings of the run.
+    /// Settings of the run; the next step uses what is written.
     pub settings: Settings,
-    /// Phase times of the last step, with [`Settings::timed`].
-    pub timings: Timings,
-    /// Counts of the last step.
-    pub counts: StepCounts,
-    /// Number of steps taken.
-    pub step_index: u64,
+    timings: Timings,
+    counts: StepCounts,
+    step_index: u64,
     traits: Traits,
     features: Features,
     surfaces: Vec<Surface>,
     broadphase: BroadPhase,
+    /// Kind and length unit that `broadphase`, the bounds and the candidates are for.
+    bounds_are_for: (BroadPhaseKind, f32),
     proxies: Vec<Proxy>,
     fat_boxes: FatBoxes,
     pairs: Vec<[u32; 2]>,
@@ -192,6 +192,7 @@ impl World {
             belts: Vec::new(),
             contacts: Vec::new(),
             broadphase: BroadPhase::new(settings.broadphase),
+            bounds_are_for: (settings.broadphase, settings.length_unit),
             timings: Timings::default(),
             counts: StepCounts::default(),
             step_index: 0,
@@ -236,6 +237,27 @@ impl World {
         &self.shape_body
     }
 
+    /// Number of steps taken.
+    pub fn step_index(&self) -> u64 {
+        self.step_index
+    }
+
+    /// Sets the number of steps taken, for a world that mirrors the states of another engine.
+    #[doc(hidden)]
+    pub fn set_step_index(&mut self, steps: u64) {
+        self.step_index = steps;
+    }
+
+    /// Counts of the last step.
+    pub fn counts(&self) -> &StepCounts {
+        &self.counts
+    }
+
+    /// Phase times of the last step, with [`Settings::timed`].
+    pub fn timings(&self) -> &Timings {
+        &self.timings
+    }
+
     /// Kernel features that the scene's constraints need.
     pub fn features(&self) -> Features {
         self.features
@@ -262,6 +284,8 @@ impl World {
         self.end_sleep();
         if self.settings.contact_events {
             self.find_events();
+        } else {
+            self.events.clear();
         }
         self.check().map_err(StepError::Diverged)
     }

@@ -1,7 +1,6 @@
 //! Serialization of a world: the state at the start of a step, without values that the step recomputes.
 //!
-//! Not saved: constraints of the caller's own types (a world with any is an error), and the chains and jams of `shim`.
-//! All other solvers continue bit-identically.
+//! Not saved: constraints of the caller's own types (a world with any is an error). A world continues bit-identically.
 
 use super::edit::{Slots, StandingForces, Target};
 use super::events::Events;
@@ -100,6 +99,7 @@ impl Serialize for World {
             let message = "constraints of the caller's own types cannot be saved";
             return Err(serde::ser::Error::custom(message));
         }
+        let is_active = std::ptr::eq(self.solver_is, self.settings.solver);
         let saved = SavedWorld {
             settings: self.settings.clone(),
             step_index: self.step_index,
@@ -111,7 +111,7 @@ impl Serialize for World {
             impulses_of: self.impulses_of,
             kept: self.work.kept.clone(),
             found: self.narrow.found.clone(),
-            of_solver: self.solver.kept(),
+            of_solver: if is_active { self.solver.kept() } else { Vec::new() },
             applied: self.applied.clone(),
             targets: self.targets.clone(),
             filters: self.filters.clone(),
@@ -128,8 +128,7 @@ impl Serialize for World {
 impl<'de> Deserialize<'de> for World {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let mut saved = SavedWorld::deserialize(from)?;
-        saved.check().map_err(serde::de::Error::custom)?;
-        Ok(saved.restore())
+        saved.check().and_then(|()| saved.restore()).map_err(serde::de::Error::custom)
     }
 }
 
@@ -201,7 +200,7 @@ impl SavedWorld {
         }
     }
 
-    fn restore(self) -> World {
+    fn restore(self) -> Result<World, String> {
         let mut world = World::new(self.settings);
         let nothing = BodyDef::fixed([0.0; 2]);
         for &count in &self.slots.shapes {
@@ -227,12 +226,14 @@ impl SavedWorld {
         if self.kept.size() == world.solver_is.kept {
             world.work.kept = self.kept;
         }
-        world.solver.set_kept(&self.of_solver);
+        if !world.solver.set_kept(&self.of_solver) {
+            return Err(format!("of_solver: are not numbers of {}", world.solver_is.name));
+        }
         self.joints.restore(&mut world);
         world.sleep = self.sleep;
         world.update_pairs();
         world.contacts = self.contacts;
         world.narrow.relink(&mut world.contacts);
-        world
+        Ok(world)
     }
 }

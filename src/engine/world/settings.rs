@@ -104,7 +104,8 @@ pub struct Settings {
     pub frozen: Freezing,
     /// Sum impulses over the substeps into [`crate::contacts::Contact::step_impulse`].
     pub record_impulses: bool,
-    /// Find [`World::contact_events`](crate::world::World::contact_events) after each step.
+    /// Find [`World::contact_events`](crate::world::World::contact_events) after each step. In the first such step, contacts that
+    /// exist already begin.
     pub contact_events: bool,
     /// Keep the rule of each step's last velocity sweep, see [`crate::world::World::observed_rule`].
     pub observe_rule: bool,

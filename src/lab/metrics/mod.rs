@@ -185,7 +185,8 @@ impl Observation {
             self.tangent.add(tangent);
             // In the first step of a scene, bodies that are placed flush overlap or not by rounding alone, and so do
             // rules differ that treat gaps and overlaps differently.
-            let lighter = lighter_weight([a, b].map(|i| &self.previous[*i])).filter(|_| world.step_index > 1);
+            let lighter =
+                lighter_weight([a, b].map(|i| &self.previous[*i])).filter(|_| world.step_index() > 1);
             if let Some(lighter) = lighter {
                 self.lighter.add(normal.hypot(tangent) / (lighter * self.dt));
             }
@@ -203,7 +204,7 @@ impl Observation {
         let kinetic: f64 = now.iter().map(BodyState::kinetic_energy).sum();
         self.rest.add(ratio(2.0 * kinetic, self.balance.mass()), &now, &points);
         if self.blown_up.is_none() && self.balance.is_blown_up(kinetic) {
-            self.blown_up = Some(fastest(&now, world.step_index));
+            self.blown_up = Some(fastest(&now, world.step_index()));
         }
         self.previous = now;
         self.steps += 1;
@@ -334,7 +335,7 @@ fn fastest(bodies: &[BodyState], step: u64) -> Divergence {
         .flat_map(|b| [(Quantity::Speed, b.velocity.length()), (Quantity::Spin, b.angular_velocity.abs())]);
     let (i, (quantity, speed)) =
         speeds.enumerate().max_by(|a, b| a.1.1.total_cmp(&b.1.1)).unwrap_or_default();
-    Divergence { step, body: i / 2, quantity, speed: speed as f32, criterion: Criterion::Energy }
+    Divergence::new(step, i / 2, quantity, speed as f32, Criterion::Energy)
 }
 
 /// State of every body in double precision.
@@ -347,7 +348,7 @@ fn snapshot(world: &World) -> Vec<BodyState> {
 fn contact_points(world: &World) -> Vec<([usize; 2], PointStep)> {
     let wide = |v: Vec2| v.as_dvec2();
     let slowest = f64::from(RESTITUTION_THRESHOLD * world.settings.length_unit);
-    let mut points = Vec::with_capacity(world.counts.points);
+    let mut points = Vec::with_capacity(world.counts().points);
     for contact in &world.contacts {
         for (point, impulse) in contact.manifold.points().iter().zip(contact.step_impulse) {
             let step = PointStep {

@@ -136,8 +136,8 @@ pub fn profile(start: &World, scene: &str, seconds: f64, ceilings: bool) -> Resu
         for _ in 0..STEPS {
             stepped(&mut world)?;
             for (phase, times) in times.iter_mut().enumerate() {
-                laps[phase] += world.timings.laps[phase];
-                times.push(world.timings.phase_ns[phase] as f64);
+                laps[phase] += world.timings().laps[phase];
+                times.push(world.timings().phase_ns[phase] as f64);
             }
             steps += 1;
         }
@@ -163,8 +163,8 @@ pub fn profile(start: &World, scene: &str, seconds: f64, ceilings: bool) -> Resu
         let middle = median(&pass_ns);
         let deviations: Vec<f64> = pass_ns.iter().map(|t| (t - middle).abs()).collect();
         let rows = match phase {
-            Phase::Solve | Phase::Relax => rows_per_point * world.counts.points,
-            Phase::Position | Phase::Restitution => world.counts.points,
+            Phase::Solve | Phase::Relax => rows_per_point * world.counts().points,
+            Phase::Position | Phase::Restitution => world.counts().points,
             _ => 0,
         };
         PhaseReport {
@@ -188,7 +188,7 @@ pub fn profile(start: &World, scene: &str, seconds: f64, ceilings: bool) -> Resu
         substeps: world.settings.budget.substeps,
         bodies: world.bodies.len(),
         has_joints: !world.workspace().types.is_empty(),
-        counts: world.counts,
+        counts: *world.counts(),
         phases,
         multiply_adds: ceilings.then(|| median(&arithmetic)),
         steps,

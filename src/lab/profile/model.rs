@@ -106,7 +106,7 @@ pub fn of(world: &mut World, phase: Phase) -> Option<PassWork> {
     let (features, solver) = (world.features(), world.settings.solver.name);
     let bodies = world.bodies.len() as f64;
     let moving = (0..world.bodies.len()).filter(|&i| world.bodies.kind(i) != BodyKind::Static).count() as f64;
-    let (contacts, counts) = (world.contacts.len() as f64, world.counts);
+    let (contacts, counts) = (world.contacts.len() as f64, *world.counts());
     let proxies = (size_of::<Proxy>() * world.shapes().len()) as f64;
     let work = world.workspace();
     let (rows, sets) = (work.rows.len() as f64, [&work.lanes, &work.serial]);

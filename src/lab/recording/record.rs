@@ -160,7 +160,7 @@ pub fn record_trial(
             Some(recorder) => recorder.add(world)?,
             None => recorder = Some(Recorder::new(world, caption(world), every, contacts)),
         }
-        after(world.step_index);
+        after(world.step_index());
         Ok(())
     })?;
     let blew_up = found.failure.map(|d| format!("blew up at step {}", d.step));

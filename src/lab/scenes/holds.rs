@@ -207,7 +207,7 @@ impl SceneMonitor {
             through.map(|(i, _)| (Mark::Tunneled, Some(i)))
         };
         let broken = broken.or_else(through);
-        self.broken = broken.map(|(mark, body)| Broken { mark, step: world.step_index, body });
+        self.broken = broken.map(|(mark, body)| Broken { mark, step: world.step_index(), body });
         if self.demands.iter().any(|d| matches!(d, Demand::GainsNoEnergy)) {
             self.energy[1] = self.energy[1].max(energies(world)[0]);
         }

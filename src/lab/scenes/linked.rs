@@ -34,7 +34,7 @@ struct Gaps {
 
 impl Observer for Gaps {
     fn observe(&mut self, world: &World) {
-        if world.step_index < self.from {
+        if world.step_index() < self.from {
             return;
         }
         for (handle, _) in world.joints() {
@@ -95,7 +95,8 @@ mod tests {
         let (scene, mut world) = world();
         let mut observer = gaps(&scene, 2.0 * scene.dt).observer;
         for (step, x) in [(1, 9.0), (2, 1.5), (3, 0.5), (4, 1.0)] {
-            (world.step_index, world.bodies.position_x[1]) = (step, x);
+            world.set_step_index(step);
+            world.bodies.position_x[1] = x;
             observer.observe(&world);
             assert_eq!(observer.error().is_some(), step >= 2);
         }

@@ -65,7 +65,7 @@ impl<'a> View<'a> {
         Self {
             bodies: &world.bodies,
             contacts: &world.contacts,
-            step: world.step_index,
+            step: world.step_index(),
             dt: f64::from(world.settings.dt),
             substeps: world.settings.budget.substeps.max(1),
             impulses: world.settings.record_impulses,

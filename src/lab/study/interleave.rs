@@ -230,7 +230,7 @@ impl Timing {
             Some(before) => waited().unwrap_or(before).saturating_sub(before).min(elapsed),
             None => Duration::ZERO,
         };
-        self.load.add(&world.counts);
+        self.load.add(world.counts());
         (nanos(elapsed - pause), nanos(pause))
     }
 
@@ -238,12 +238,12 @@ impl Timing {
     fn clocked(&mut self, world: &mut World) {
         world.settings.timed = true;
         self.failure = world.step().err().and_then(StepError::divergence);
-        self.load.add(&world.counts);
-        for (times, &ns) in self.phases.iter_mut().zip(&world.timings.phase_ns) {
+        self.load.add(world.counts());
+        for (times, &ns) in self.phases.iter_mut().zip(&world.timings().phase_ns) {
             times.push(ns as f64);
         }
-        if world.counts.row_updates > 0 {
-            self.row_sweep.push(world.timings.sweep_ns() as f64 / world.counts.row_updates as f64);
+        if world.counts().row_updates > 0 {
+            self.row_sweep.push(world.timings().sweep_ns() as f64 / world.counts().row_updates as f64);
         }
         world.settings.timed = false;
     }

@@ -340,11 +340,11 @@ fn judge(
     let (mut hash, mut steps, mut sweeps) = (0, 0_u64, 0);
     let trial = Trial { until_broken: hash_at.is_none(), ..Trial::of(&mut loaded, own) };
     let found = trial.run(&mut |world| {
-        if hash_at.is_some_and(|step| world.step_index == u64::from(step)) {
+        if hash_at.is_some_and(|step| world.step_index() == u64::from(step)) {
             hash = world.state_hash();
         }
-        if world.step_index > 0 {
-            (steps, sweeps) = (steps + 1, sweeps + world.counts.sweeps);
+        if world.step_index() > 0 {
+            (steps, sweeps) = (steps + 1, sweeps + world.counts().sweeps);
         }
         Ok(())
     })?;

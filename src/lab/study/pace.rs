@@ -43,7 +43,7 @@ impl Pace {
                 let ns = took.as_nanos() as f64;
                 keep_least(&mut times, step, ns);
                 if step == contacts.len() {
-                    contacts.push(world.counts.contacts);
+                    contacts.push(world.counts().contacts);
                 }
                 if stepped.is_err() {
                     break;

@@ -350,7 +350,7 @@ impl From<Divergence> for FailedAt {
 impl std::fmt::Display for FailedAt {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let &FailedAt { step, body, quantity, criterion, speed } = self;
-        Divergence { step, body, quantity, criterion, speed: speed.unwrap_or(f32::NAN) }.fmt(f)
+        Divergence::new(step, body, quantity, speed.unwrap_or(f32::NAN), criterion).fmt(f)
     }
 }
 
@@ -472,7 +472,7 @@ pub(crate) mod tests {
     #[test]
     fn a_failure_without_a_finite_speed_says_so() {
         let of = |quantity, speed, criterion| {
-            FailedAt::from(Divergence { step: 3, body: 1, quantity, speed, criterion }).to_string()
+            FailedAt::from(Divergence::new(3, 1, quantity, speed, criterion)).to_string()
         };
         let bounds = |quantity, speed| of(quantity, speed, Criterion::Bounds);
         let cure = "; try more substeps, a shorter step or another solver";

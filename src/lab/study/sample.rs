@@ -191,8 +191,12 @@ mod tests {
     #[test]
     fn occupancy_is_contacts_over_lanes() {
         let mut sum = LoadSum::default();
-        sum.add(&StepCounts { contacts: 6, lane_slots: 16, colors: 2, rows: 24, ..StepCounts::default() });
-        sum.add(&StepCounts { contacts: 10, lane_slots: 16, colors: 1, ..StepCounts::default() });
+        for (contacts, lane_slots, colors, rows) in [(6, 16, 2, 24), (10, 16, 1, 0)] {
+            let mut counts = StepCounts::default();
+            (counts.contacts, counts.lane_slots, counts.colors, counts.rows) =
+                (contacts, lane_slots, colors, rows);
+            sum.add(&counts);
+        }
         let load = sum.average();
         assert_eq!((load.occupancy, load.colors, load.rows, load.contacts), (0.5, 2, 12.0, 8.0));
     }

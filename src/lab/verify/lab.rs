@@ -162,7 +162,7 @@ pub(super) fn steps(world: &World, seconds: f64) -> u64 {
 
 /// Simulated time (s).
 pub(super) fn time(world: &World) -> f64 {
-    world.step_index as f64 * f64::from(world.settings.dt)
+    world.step_index() as f64 * f64::from(world.settings.dt)
 }
 
 /// Center of mass of body `i` (m).

@@ -279,7 +279,7 @@ impl From<StepError> for Failure {
         match error {
             StepError::Settings(error) => Failure::Refused(error.into()),
             StepError::Diverged(divergence) => Failure::Diverged(divergence),
-            StepError::Panicked(message) => panic!("{message}"),
+            error => panic!("{error}"),
         }
     }
 }

@@ -97,7 +97,7 @@ fn squads(lab: &Lab, change: fn(&Momentum, &Momentum) -> f64) -> Measured {
     let start = momentum(&lab.world(scene.clone())?);
     let mut sweeps = 0;
     let found = lab.most(scene, 0.0..3.0, 0.0, |world| {
-        sweeps += world.counts.sweeps;
+        sweeps += world.counts().sweeps;
         change(&start, &momentum(world))
     })?;
     Ok(Finding { tolerance: 1e-6 * (sweeps as f64).sqrt(), ..found })
@@ -131,7 +131,7 @@ fn slid(lab: &Lab, name: &str, dt: f64) -> Result<(f64, f64), Failure> {
         _ => 2.0 / 3.0 * G * slope.sin(),
     };
     let world = lab.run(Scene { dt, ..lab.scene(name)? }, 2.0, |_| ())?;
-    let (t, n) = (time(&world), world.step_index as f64 * lab.substeps());
+    let (t, n) = (time(&world), world.step_index() as f64 * lab.substeps());
     let distance = downhill(center(&world, 1), slope);
     let parabola = 0.5 * a * t * t;
     Ok((distance / (parabola * (1.0 + 1.0 / n)) - 1.0, distance / parabola - 1.0))

@@ -31,7 +31,7 @@ pub(super) static CASES: &[Case] = &[
         .by(|lab| {
             let scene = Scene::new("apart", vec![square(-0.4, 0.0), square(0.4, 0.0)]).weightless();
             let mut sweeps = 0;
-            let world = lab.run(scene, 2.0, |world| sweeps += world.counts.sweeps)?;
+            let world = lab.run(scene, 2.0, |world| sweeps += world.counts().sweeps)?;
             let gap = center(&world, 1)[0] - center(&world, 0)[0] - 1.0;
             let tolerance = 1e-6 * (sweeps as f64).sqrt() * f64::from(MAX_PUSH_SPEED);
             Ok(Finding::new(rms_speed(&world), 0.0, tolerance).note(format!("gap {gap:.1e} m")))

@@ -175,7 +175,7 @@ pub(super) static CASES: &[Case] = &[
             let scene = Scene::new("wedge", vec![ground(60.0, 0.0), wedge, block]);
             let start = center(&lab.world(scene.clone())?, 1)[0];
             lab.after(scene, 1.0, |world| {
-                let (t, n) = (time(world), world.step_index as f64 * lab.substeps());
+                let (t, n) = (time(world), world.step_index() as f64 * lab.substeps());
                 let a = m * G * sin * cos / (big + m * sin * sin);
                 let truth = 0.5 * a * t * t * (1.0 + 1.0 / n);
                 let momentum = big * velocity(world, 1)[0] + m * velocity(world, 2)[0];

@@ -240,7 +240,7 @@ fn creep(lab: &Lab, count: u32) -> Measured {
     }
     let mut paths = vec![Vec::new(); count as usize];
     lab.run(scene, 600.0, |world| {
-        if time(world) >= 300.0 && world.step_index.is_multiple_of(20) {
+        if time(world) >= 300.0 && world.step_index().is_multiple_of(20) {
             for (i, path) in paths.iter_mut().enumerate() {
                 path.push((time(world), downhill(center(world, i + 1), angle)));
             }

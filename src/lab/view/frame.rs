@@ -53,7 +53,7 @@ impl Session {
         let bodies = &world.bodies;
         let origin = DVec2::from(self.stage.origin);
         let relative = |i: usize| (DVec2::from(bodies.center(i)) - origin).as_vec2();
-        let points = if self.shown.points { world.counts.points } else { 0 };
+        let points = if self.shown.points { world.counts().points } else { 0 };
         let islands = if self.shown.islands { islands(world) } else { Vec::new() };
         let depths = if self.shown.depths { depths(world) } else { Vec::new() };
         for number in [bodies.len(), depths.len(), points, islands.len()] {
@@ -84,7 +84,7 @@ impl Session {
 /// What changes with every step, of a pane.
 fn status(pane: &Pane) -> Value {
     let (good, verdict) = pane.verdict();
-    let (timings, counts) = (&pane.world.timings, &pane.world.counts);
+    let (timings, counts) = (pane.world.timings(), pane.world.counts());
     json!({
         "last": pane.last(),
         "phase_ns": timings.phase_ns,

@@ -81,7 +81,7 @@ impl Pane {
             self.monitor = SceneMonitor::new(&self.world, self.loaded.demands.clone());
         }
         self.meter = Some(Observation::new(&self.world));
-        self.since = self.world.step_index;
+        self.since = self.world.step_index();
     }
 
     /// Takes a step. `measured`: whether its errors are measured, or `None` to measure them with those of all others.
@@ -101,13 +101,11 @@ impl Pane {
         match self.world.step() {
             Ok(()) => {}
             Err(StepError::Settings(error)) => return Err(error.into()),
-            Err(error @ StepError::Panicked(_)) => {
-                return Err(Error::invalid("threads", error.to_string()));
-            }
             Err(StepError::Diverged(divergence)) => {
                 self.failure = Some(divergence.into());
                 return Ok(());
             }
+            Err(error) => return Err(Error::invalid("threads", error.to_string())),
         }
         if let Some(single) = &mut single {
             single.observe(&self.world);
@@ -173,7 +171,7 @@ impl Pane {
         let errors = self.meter.as_ref().map_or_else(alone, Observation::errors);
         let mut tolerances = *tolerances;
         // Nothing rests, and little is reached, before the run that the scene asks for.
-        if self.world.step_index < u64::from(scene.steps) {
+        if self.world.step_index() < u64::from(scene.steps) {
             tolerances.rest = None;
         }
         if truth.is_none_or(|t| t.error.is_none()) {
@@ -193,7 +191,7 @@ impl Pane {
     pub fn verdict(&self) -> (bool, String) {
         let record = self.record();
         let steps = self.loaded.scene.steps;
-        let far = if self.world.step_index < u64::from(steps) { " so far" } else { "" };
+        let far = if self.world.step_index() < u64::from(steps) { " so far" } else { "" };
         if let Some(why) = record.why_failed() {
             let why = why.split("; try ").next().unwrap_or_default().to_string();
             return (

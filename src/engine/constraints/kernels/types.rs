@@ -229,6 +229,7 @@ impl Clone for Box<dyn ConstraintType> {
 /// Impulses of a constraint on its bodies a and b in one step: `[N·s, N·s, N·m·s]` each, about their centers
 /// of mass.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct RecordedImpulses {
     /// Sum of all impulses.
     pub all: [[f32; 3]; 2],

@@ -197,6 +197,16 @@ impl Jams {
         }
     }
 
+    /// The bodies in a jam.
+    pub fn kept(&self) -> impl Iterator<Item = u32> {
+        self.jammed.iter().map(|&(body, _)| body)
+    }
+
+    /// Takes the bodies of [`Self::kept`].
+    pub fn set_kept(&mut self, bodies: impl Iterator<Item = u32>) {
+        self.jammed = bodies.map(|body| (body, 0.0)).collect();
+    }
+
     /// Forgets the bodies in a jam.
     pub fn clear(&mut self) {
         self.jammed.clear();

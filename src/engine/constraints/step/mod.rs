@@ -56,6 +56,7 @@ pub struct Passes<'a> {
 }
 
 /// Data for a solver's own passes over bodies and contacts.
+#[non_exhaustive]
 pub struct StepParts<'p> {
     /// The workspace.
     pub work: &'p mut Workspace,

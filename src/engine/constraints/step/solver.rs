@@ -35,8 +35,10 @@ pub trait Solver: CloneSolver + fmt::Debug + Send + Sync {
         Vec::new()
     }
 
-    /// Takes the numbers of [`Self::kept`]; those of another solver, or of other bodies, are ignored.
-    fn set_kept(&mut self, _kept: &[f64]) {}
+    /// Takes the numbers of [`Self::kept`], or none. Returns whether it can; those of bodies that are gone are ignored.
+    fn set_kept(&mut self, kept: &[f64]) -> bool {
+        kept.is_empty()
+    }
 }
 
 /// A copy of a solver, with all data that it keeps. Every solver that is `Clone` has it.
@@ -58,6 +60,7 @@ impl Clone for Box<dyn Solver> {
 }
 
 /// The part of a world that a solver can access around a collision.
+#[non_exhaustive]
 pub struct CollisionScene<'a> {
     /// Bodies at the beginning of the step.
     pub bodies: &'a Bodies,
@@ -83,6 +86,7 @@ pub struct CollisionScene<'a> {
 
 /// A solver's requests for the next collision phase.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Collision {
     /// Which contacts roll. `None` if no radii of curvature are needed ([`Contact::radii`]).
     pub rolling: Option<Rolling>,

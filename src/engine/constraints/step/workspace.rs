@@ -85,6 +85,7 @@ impl Clone for Workspace {
 
 /// Work counts of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct WorkCount {
     /// Passes over all constraints that solve rows. Warm starts are not counted.
     pub sweeps: usize,

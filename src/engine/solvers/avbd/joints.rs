@@ -101,15 +101,16 @@ impl JointDescent {
         self.bodies.iter().zip(&self.blocks).flat_map(of).collect()
     }
 
-    /// Takes the numbers of [`Self::kept`].
-    pub fn set_kept(&mut self, kept: &[f64]) {
-        let blocks = kept.as_chunks::<{ 2 + ROWS }>().0;
+    /// Takes the numbers of [`Self::kept`]; returns whether they are whole blocks.
+    pub fn set_kept(&mut self, kept: &[f64]) -> bool {
+        let (blocks, rest) = kept.as_chunks::<{ 2 + ROWS }>();
         self.bodies = blocks.iter().map(|&[a, b, ..]| [a as u32, b as u32]).collect();
         let block = |&[_, _, x, y, z]: &[f64; 5]| KeptBlock {
             penalty: [x, y, z].map(|x| x as f32),
             ..KeptBlock::default()
         };
         self.blocks = blocks.iter().map(block).collect();
+        rest.is_empty()
     }
 
     /// Collects the blocks of `joint` at the current positions of bodies; returns their range in `blocks`.

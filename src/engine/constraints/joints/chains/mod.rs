@@ -86,6 +86,8 @@ use system::ChainSystem;
 pub struct Chains {
     /// Ends of all joints when the chains were found. `[joints]`
     ends: Vec<[u32; 2]>,
+    /// Number of joints of each type at that time, and of rigid rows of each joint. `[types]`
+    sizes: Vec<[usize; 2]>,
     /// Whether impulses moved the bodies at that time. `[rows]`
     moves: Vec<bool>,
     /// Links by type, in the order of their slots.
@@ -97,6 +99,8 @@ pub struct Chains {
     /// Share of its inverse mass that a body has for these contacts and rows. `[rows]`
     shares: Vec<f32>,
     masses: ScaledMasses,
+    /// [`Self::kept`] when chains are found.
+    kept: Vec<[f64; 3]>,
 }
 
 /// Memory to find chains.
@@ -112,21 +116,37 @@ struct ChainSearch {
 impl Chains {
     /// Finds the chains among the joints of these types, if joints or bodies have changed.
     pub fn find(&mut self, types: &[ConstraintSet], rows: &[BodyRow]) {
+        let sizes = || types.iter().map(|t| [t.kind.ends().len(), t.kind.rigid_size()]);
         let is_same = self.moves.len() == rows.len()
             && self.moves.iter().zip(rows).all(|(&moves, row)| moves == moves_by_impulses(row))
-            && self.ends.iter().eq(types.iter().flat_map(|t| t.kind.ends()));
-        if is_same && self.links.len() == types.len() {
+            && self.ends.iter().eq(types.iter().flat_map(|t| t.kind.ends()))
+            && sizes().eq(self.sizes.iter().copied());
+        if is_same {
             return;
         }
+        self.kept = self.kept();
         self.moves.clear();
         self.moves.extend(rows.iter().map(moves_by_impulses));
         self.ends.clear();
         self.ends.extend(types.iter().flat_map(|t| t.kind.ends()));
+        self.sizes.clear();
+        self.sizes.extend(sizes());
         let moves = |body: u32| self.moves[body as usize];
         self.search.graph.list(types, |kind| kind.rigid_size() > 0, self.moves.len(), moves);
         self.search.find();
         self.lay_out(types);
         self.system.note(rows);
+        self.system.set_kept(&self.kept);
+    }
+
+    /// What chains keep from step to step: bodies with the pull and the spin that the last solve left.
+    pub fn kept(&self) -> Vec<[f64; 3]> {
+        if self.moves.is_empty() { self.kept.clone() } else { self.system.kept(|body| self.moves[body]) }
+    }
+
+    /// Takes the numbers of [`Self::kept`].
+    pub fn set_kept(&mut self, kept: Vec<[f64; 3]>) {
+        *self = Chains { kept, ..Chains::default() };
     }
 
     /// Assigns links to slots of the system.

@@ -41,6 +41,7 @@ use crate::constraints::records::links::{LINK_LANES, LinkGroups, LinkImpulses, L
 use crate::lanes::{BodyRow, Indices, LaneIndex, Lanes};
 use apparent::Apparent;
 use blocks::{Factor, LaneMatrix, LaneVector, down, each, less, minus, reduce, transposed, up};
+use std::collections::BTreeMap;
 use wide::f32x8;
 
 /// The links of all chains.
@@ -149,6 +150,32 @@ impl ChainSystem {
         for k in 0..self.groups {
             let velocity = velocity_of(rows, self.bodies_of(k));
             self.velocities[k] = [velocity[VX], velocity[VY], velocity[W]];
+        }
+    }
+
+    /// Bodies R that move, with their pull and their spin after the last solve.
+    pub fn kept(&self, moves: impl Fn(usize) -> bool) -> Vec<[f64; 3]> {
+        let of = |(slot, &body): (usize, &u32)| {
+            let (k, lane) = (slot / LINK_LANES, slot % LINK_LANES);
+            [
+                body.into(),
+                self.pulls[k].as_array()[lane].into(),
+                self.velocities[k][2].as_array()[lane].into(),
+            ]
+        };
+        self.bodies.iter().enumerate().filter(|&(_, &body)| moves(body as usize)).map(of).collect()
+    }
+
+    /// Takes the numbers of [`Self::kept`] for the bodies that are in both systems.
+    pub fn set_kept(&mut self, kept: &[[f64; 3]]) {
+        let kept: BTreeMap<u32, [f64; 2]> =
+            kept.iter().map(|&[body, pull, spin]| (body as u32, [pull, spin])).collect();
+        for (slot, body) in self.bodies.iter().enumerate() {
+            if let Some(&[pull, spin]) = kept.get(body) {
+                let (k, lane) = (slot / LINK_LANES, slot % LINK_LANES);
+                self.pulls[k].as_mut_array()[lane] = pull as f32;
+                self.velocities[k][2].as_mut_array()[lane] = spin as f32;
+            }
         }
     }
 
