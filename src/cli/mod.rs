@@ -7,6 +7,7 @@ pub mod advise;
 pub mod args;
 pub mod compare;
 pub mod converge;
+mod copies;
 pub mod interrupt;
 pub mod list;
 pub mod output;

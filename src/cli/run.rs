@@ -1,5 +1,6 @@
 //! `simpulse run`: one scene, one solver; times per phase, errors, and trajectories as CSV.
 
+use super::copies;
 use super::output::{note, print_beside, print_json, value};
 use super::picture::{self, PictureArgs};
 use super::progress::Bar;
@@ -42,6 +43,7 @@ Examples:
   simpulse run crane --joints joints.csv --every 1
   simpulse run pyramid:20 --picture pyramid.svg --step 120
   simpulse run smash --trace smash.json                    which step is the longest, and why? (ui.perfetto.dev)
+  simpulse run circle_pile:100 --copies 64 --threads 2     is that error an accident of one pile?
   simpulse run stack:20 --steps 1200 --poke 1              does it survive a player?
   simpulse run stack:12 --solvers pgs,soft_step --record replay.html --record-contacts")]
 pub struct RunArgs {
@@ -64,6 +66,11 @@ pub struct RunArgs {
     /// Steps [default: those of the scene]
     #[arg(help_heading = "Scene and time", long, value_name = "N")]
     pub steps: Option<u32>,
+    /// Run this many copies from consecutive seeds as one batch, and print means of their errors. Scenes without a random
+    /// element differ by small speeds at the start
+    #[arg(help_heading = "Scene and time", long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536),
+        conflicts_with_all = ["state", "contacts", "joints", "trace", "picture", "record", "poke", "every"])]
+    pub copies: Option<u32>,
     /// Step in seconds [default: that of the scene]
     #[arg(help_heading = "Scene and time", long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub dt: Option<f64>,
@@ -151,6 +158,9 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         if value == Some(0) {
             return Err(Error::invalid(name, "0 is too few: at least 1 is needed"));
         }
+    }
+    if let Some(count) = args.copies {
+        return copies::run(args, count);
     }
     if let Some(path) = &args.picture.picture {
         return picture::run(args, path);

@@ -92,7 +92,7 @@
 //! reference  metrics             certified solutions; errors read from states
 //! scenes  capture  picture       what is simulated, and its known truth; frozen problems; frames drawn
 //! pokes                          random pushes
-//! trial                          one run to its verdict
+//! trial  copies                  one run to its verdict; many copies as one batch
 //! recording  chart               whole runs in a file, and the page that plays them; charts as SVG
 //! study  converge  verify        solver × scene × budget; iterations to a tolerance; hard cases
 //! report                         tables, plots, records
@@ -108,6 +108,7 @@ pub mod capture;
 pub mod chart;
 pub mod compare;
 pub mod converge;
+pub mod copies;
 pub mod error;
 #[doc(hidden)]
 pub mod files;

@@ -137,10 +137,10 @@ impl Bodies {
         i
     }
 
-    /// Gives some bodies the state that they have in `from`.
-    pub(crate) fn restore(&mut self, from: &mut Bodies, bodies: Range<usize>) {
+    /// Gives bodies from `first` on the state that `bodies` have in `from`.
+    pub(crate) fn restore(&mut self, first: usize, from: &mut Bodies, bodies: Range<usize>) {
         for (array, from) in self.arrays_mut().into_iter().zip(from.arrays_mut()) {
-            array[bodies.clone()].copy_from_slice(&from[bodies.clone()]);
+            array[first..first + bodies.len()].copy_from_slice(&from[bodies.clone()]);
         }
     }
 

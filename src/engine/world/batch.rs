@@ -4,6 +4,7 @@ use super::{StepError, World};
 use crate::bodies::def::finite_pair;
 use crate::bodies::{Bodies, BodyHandle, BodyKind};
 use crate::broadphase::{BroadPhase, Spaces};
+use crate::contacts::Contact;
 use crate::error::Error;
 use crate::joints::Joint;
 use crate::workers::Workers;
@@ -168,6 +169,30 @@ impl Batch {
         (&self.rooms[room].world, bodies)
     }
 
+    /// Gives a world that holds the scene of a copy alone the state of the copy: bodies, contacts and number of steps. It then
+    /// serves to measure the copy, except for the loads of joints.
+    ///
+    /// # Panics
+    /// If there is no such copy, or `to` has another number of bodies.
+    pub fn read(&mut self, copy: usize, to: &mut World) {
+        let (i, bodies) = self.place(copy);
+        assert_eq!(to.bodies.len(), self.bodies, "bodies of a copy");
+        let world = &mut self.rooms[i].world;
+        to.bodies.restore(0, &mut world.bodies, bodies.clone());
+        let (body, shape) = (bodies.start as u32, world.slots.first_shape[bodies.start]);
+        let from = world.contacts.partition_point(|c| c.body_b < body && c.body_a < body);
+        to.contacts.clear();
+        let own = world.contacts[from..].iter().take_while(|c| bodies.contains(&(c.body_b as usize)));
+        to.contacts.extend(own.map(|c| Contact {
+            body_a: c.body_a - body,
+            body_b: c.body_b - body,
+            shape_a: c.shape_a - shape,
+            shape_b: c.shape_b - shape,
+            ..*c
+        }));
+        to.step_index = world.step_index;
+    }
+
     /// Room and bodies of a copy.
     fn place(&self, copy: usize) -> (usize, Range<usize>) {
         assert!(copy < self.copies, "no copy {copy}: there are {}", self.copies);
@@ -218,7 +243,7 @@ impl Batch {
         let Room { world, start, joints, .. } = &mut self.rooms[i];
         let number = copy % self.each;
         let joints = joints[number]..joints[number + 1];
-        world.bodies.restore(start, bodies.clone());
+        world.bodies.restore(bodies.start, start, bodies.clone());
         world.restart(bodies, joints);
     }
 

@@ -300,7 +300,7 @@ impl World {
             (sleep.state[i], sleep.drives[i], any_drives) = (DUE, true, true);
             sleep.disturb(i);
             if i < sleep.seen.len() {
-                sleep.seen.restore(bodies, i..i + 1);
+                sleep.seen.restore(i, bodies, i..i + 1);
             }
         }
         if sleep.seen.len() != bodies.len() {
@@ -403,7 +403,7 @@ impl World {
             for velocity in [&mut bodies.velocity_x, &mut bodies.velocity_y, &mut bodies.angular_velocity] {
                 velocity[body] = 0.0;
             }
-            seen.restore(bodies, body..body + 1);
+            seen.restore(body, bodies, body..body + 1);
         }
         self.counts.asleep = sleep.count;
         if any {

@@ -83,11 +83,19 @@ impl Scene {
         settings.check()?;
         let mut world = World::new(settings);
         self.check_joints()?;
-        let handles = bodies.iter().map(|body| world.add_body(body)).collect::<Result<Vec<_>, _>>()?;
-        for joint in self.joint_defs(&handles) {
-            world.add_joint(&joint)?;
-        }
+        self.add(&bodies, &mut world)?;
         Ok(world)
+    }
+
+    /// Adds the bodies and joints to a world that may have others. Errors: as [`Self::build`].
+    pub fn add_to(&self, world: &mut World) -> Result<(), Error> {
+        self.check_joints()?;
+        Ok(self.add(&self.body_defs()?, world)?)
+    }
+
+    fn add(&self, bodies: &[BodyDef], world: &mut World) -> Result<(), crate::engine::error::Error> {
+        let handles = bodies.iter().map(|body| world.add_body(body)).collect::<Result<Vec<_>, _>>()?;
+        self.joint_defs(&handles).try_for_each(|joint| world.add_joint(&joint).map(drop))
     }
 
     /// Whether a solver can run this scene.

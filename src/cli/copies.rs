@@ -1,0 +1,161 @@
+//! `simpulse run --copies`: copies of a scene from different seeds, as one batch.
+
+use super::output::{note, print, print_json, value};
+use super::progress::Bar;
+use super::run::{RunArgs, how, settings};
+use crate::engine::world::Settings;
+use crate::lab::copies::{self, Copies};
+use crate::lab::error::Error;
+use crate::lab::memory;
+use crate::lab::report::ensemble::Interval;
+use crate::lab::report::environment::Environment;
+use crate::lab::report::units::{bodies, percent, si};
+use crate::lab::scenes::Loaded;
+use crate::lab::study::open_scene;
+use serde_json::{Value, json};
+use std::process::ExitCode;
+
+/// A figure of all copies: name, name and unit in JSON, values, and how to write one.
+struct Figure<'a> {
+    name: &'a str,
+    key: &'a str,
+    values: Vec<f64>,
+    show: Box<dyn Fn(f64) -> String + 'a>,
+}
+
+/// Runs the copies, from as many seeds.
+pub fn run(args: &RunArgs, count: u32) -> Result<ExitCode, Error> {
+    let settings = settings(args, args.setting.settings()?)?;
+    let first = args.seed.unwrap_or(1);
+    let last =
+        first.checked_add(u64::from(count) - 1).ok_or_else(|| Error::invalid("seed", "is too large"))?;
+    let open = |seed: u64| open_scene(&format!("{}@{seed}", args.scene), None, args.steps, args.dt);
+    let one = open(first)?;
+    memory::check("run", one.scene.bodies.len(), 0, 2 * count as usize)?;
+    let mut loaded = (first..=last).map(open).collect::<Result<Vec<Loaded>, _>>()?;
+    let (bar, steps) = (Bar::new(), one.scene.steps as usize);
+    let found = copies::run(&mut loaded, &settings, &|step| bar.step(step as usize, steps, "steps"))?;
+    drop(bar);
+    if !found.same_bits {
+        note("note: the timed run had other bits than the measured one\n");
+    }
+    let figures = figures(&one, &found);
+    let lost = found.outcomes.iter().filter(|copy| copy.errors.is_none()).count();
+    let held = found.outcomes.iter().filter(|copy| copy.errors.is_some() && copy.broken.is_none()).count();
+    if args.json {
+        print_json(&json(args, &one, &settings, &found, &figures, [held, lost])?)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let mut text = format!(
+        "{}: {count} copies from seeds {first} to {last}, {} each, {steps} steps of {} · {}, {}\n\ncost\n",
+        args.scene,
+        bodies(one.scene.bodies.len()),
+        si(one.scene.dt, "s"),
+        settings.solver.name,
+        how(&one.scene.build(settings.clone())?)
+    );
+    let threads =
+        if settings.threads > 1 { format!("{} threads", settings.threads) } else { "one thread".into() };
+    let time = si(1e-9 * found.copy_step_ns, "s");
+    text += &format!("  {:<34}{time:>12}  mean of the whole run, {threads}\n", "time of a step of one copy");
+    text += "error, mean over copies ± half of its 95 % interval\n";
+    for Figure { name, values, show, .. } in &figures {
+        let (mean, rest) = match Interval::of(values) {
+            None => ("–".into(), String::new()),
+            Some(interval) => {
+                let [least, most] = [f64::min, f64::max]
+                    .map(|pick| values.iter().copied().reduce(pick).map_or(String::new(), show));
+                let half = interval
+                    .ends
+                    .map_or(String::new(), |[low, high]| format!("± {}; ", show(0.5 * (high - low))));
+                (show(interval.mean), format!("{half}least {least}, greatest {most}"))
+            }
+        };
+        text += &format!("  {name:<34}{mean:>12}  {rest}\n");
+    }
+    text += &format!("behavior\n  {:<34}{:>12}  {lost} diverged\n", "holds", format!("{held} of {count}"));
+    text += &one.unchecked.iter().map(|what| format!("not checked: {what}\n")).collect::<String>();
+    if !one.scene.joints.is_empty() {
+        text += "not checked: joints, energy\n";
+    }
+    print(&text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn figures<'a>(one: &Loaded, found: &'a Copies) -> Vec<Figure<'a>> {
+    let rests = one.rests();
+    let errors = || found.outcomes.iter().filter_map(|copy| copy.errors.as_ref());
+    let in_unit = |unit| Box::new(move |v| si(v, unit));
+    let mut list = vec![
+        Figure {
+            name: if rests { "overlap, 99 % and at rest" } else { "overlap that the solver left, 99 %" },
+            key: "overlap_m",
+            values: errors().map(|e| e.penetration(rests)).collect(),
+            show: in_unit("m"),
+        },
+        Figure {
+            name: "greatest overlap",
+            key: "penetration_max_m",
+            values: errors().map(|e| e.penetration_max()).collect(),
+            show: in_unit("m"),
+        },
+        Figure {
+            name: "force error, rms",
+            key: "force_error",
+            values: errors().map(|e| e.law_rms_lighter()).collect(),
+            show: Box::new(percent),
+        },
+        Figure {
+            name: "speed at rest, last second",
+            key: "rest_speed_m_s",
+            values: errors().map(|e| e.rest_velocity()).collect(),
+            show: in_unit("m/s"),
+        },
+    ];
+    if let Some(truth) = &one.truth {
+        let truths = || found.outcomes.iter().filter_map(|copy| copy.truth);
+        list.push(Figure {
+            name: "distance to reference value",
+            key: "reference_error",
+            values: truths().filter_map(|truth| truth.error).collect(),
+            show: in_unit(truth.unit),
+        });
+    }
+    list
+}
+
+/// Everything as JSON.
+fn json(
+    args: &RunArgs,
+    one: &Loaded,
+    settings: &Settings,
+    found: &Copies,
+    figures: &[Figure<'_>],
+    [held, lost]: [usize; 2],
+) -> Result<Value, Error> {
+    let mut all = serde_json::Map::new();
+    for Figure { key, values, .. } in figures {
+        let interval = Interval::of(values);
+        let ends = interval.and_then(|interval| interval.ends);
+        all.insert(
+            (*key).into(),
+            json!({ "mean": interval.map(|i| i.mean), "interval": ends, "copies": values }),
+        );
+    }
+    Ok(json!({
+        "environment": Environment::current(),
+        "scene": args.scene,
+        "bodies": one.scene.bodies.len(),
+        "steps": one.scene.steps,
+        "copies": found.outcomes.len(),
+        "first_seed": args.seed.unwrap_or(1),
+        "solver": settings.solver.name,
+        "budget": value(&settings.budget)?,
+        "threads": settings.threads,
+        "copy_step_ns": found.copy_step_ns,
+        "bits_equal": found.same_bits,
+        "errors": all,
+        "hold": held,
+        "diverged": lost,
+    }))
+}
