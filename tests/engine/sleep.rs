@@ -5,11 +5,11 @@ use proptest::test_runner::RngSeed;
 use simpulse::engine::bodies::{Bodies, BodyDef, BodyHandle, ShapeDef};
 use simpulse::engine::joints::Joint;
 use simpulse::engine::params::LINEAR_SLOP;
-use simpulse::engine::solvers::{self, VARIANTS, Variant};
+use simpulse::engine::solvers::{self, Islands, VARIANTS, Variant};
 use simpulse::engine::world::{Settings, World};
 
 fn local() -> impl Iterator<Item = &'static Variant> {
-    VARIANTS.iter().copied().filter(|variant| variant.is_local)
+    VARIANTS.iter().copied().filter(|variant| variant.islands == Islands::Apart)
 }
 
 fn sleeping(variant: &'static Variant) -> Settings {
@@ -68,9 +68,9 @@ fn what_rests_sleeps_and_stays() {
         world.step().unwrap();
         assert_eq!((asleep(&world), world.counts().asleep), (0, 0));
     }
-    let mut world = World::new(sleeping(solvers::find("nncg").unwrap()));
+    let mut world = World::new(sleeping(solvers::find("avbd").unwrap()));
     let error = world.step().unwrap_err().to_string();
-    assert_eq!(error, "sleep: nncg solves all islands together, so none can sleep");
+    assert_eq!(error, "sleep: avbd solves all islands together, so none can sleep");
 }
 
 /// What may happen to the first stack.

@@ -53,6 +53,7 @@ const LAB: &[&[&str]] = &[
     &["metrics"],
     &["scenes", "capture", "picture", "pokes"],
     &["trial"],
+    &["copies"],
     &["recording", "chart"],
     &["verify", "study", "converge"],
     &["report"],

@@ -40,7 +40,7 @@
 //! sliding contact is shifted by u, which moves in proportion to ρ per iteration: there, large ρ is fast. The
 //! residuals tell the two cases apart: λ − z is zero in a column, and some hundred times ρ D⁻¹ Δz in a slide.
 
-use super::{Guarantee, Variant};
+use super::{Guarantee, Islands, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::{Baumgarte, NormalRule};
 use crate::constraints::kernels::velocity::sweep::Sweep;
@@ -91,6 +91,7 @@ pub static SOLVER: Variant = Variant {
         "to the law of `pgs`, but its multipliers begin at the wrong contacts",
     )],
     impacts: ImpactLaw::None,
+    islands: Islands::Alone,
     make: Variant::made_by(|| Box::new(Admm::default())),
     ..Variant::BASE
 };

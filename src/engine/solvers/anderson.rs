@@ -26,7 +26,7 @@
 //!
 //! γ is found from the normal equations in `f64`, with at most 5 unknowns. 10⁻⁹ of the trace is added to their diagonal.
 
-use super::{Guarantee, Variant};
+use super::{Guarantee, Islands, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::numerics::matrix::solve_in_place;
@@ -52,6 +52,7 @@ pub static SOLVER: Variant = Variant {
         },
     ],
     exceptions: &[(Guarantee::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
+    islands: Islands::Alone,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -25,7 +25,7 @@
 //!
 //! See [`spectral`](crate::constraints::vectors::spectral); Π gives the nearest point of the cones.
 
-use super::{Guarantee, Variant};
+use super::{Guarantee, Islands, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::vectors::spectral::{Axes, ImpulseProblem, SpectralDescent};
@@ -40,6 +40,7 @@ pub static SOLVER: Variant = Variant {
     budget: Budget { substeps: 1, velocity_iterations: 20, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
     exceptions: &[(Guarantee::Converges, "to the convex relaxation, which is another law")],
+    islands: Islands::Alone,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

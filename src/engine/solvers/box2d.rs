@@ -14,7 +14,7 @@
 //! **Fails when** [`super::soft_step`] does. Sliding and sticking are less accurate: in each substep friction
 //! is solved only once, on top of the normal velocities that the springs left.
 
-use super::{Uses, Variant};
+use super::{Islands, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
 use crate::constraints::{ImpactLaw, Passes, Schedule};
@@ -33,7 +33,7 @@ pub static SOLVER: Variant = Variant {
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
     impacts: ImpactLaw::BOX2D,
     frozen: Some(FreezeLimits::BOX2D),
-    is_local: true,
+    islands: Islands::Apart,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

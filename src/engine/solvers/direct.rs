@@ -39,7 +39,7 @@
 //! For fixed states the law is linear, u = K λ + b. A step moves toward the solution of these states, as far
 //! as the residual of the natural map falls.
 
-use super::{Guarantee, Variant};
+use super::{Guarantee, Islands, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::kernels::velocity::rules::NormalRule;
@@ -90,6 +90,7 @@ pub static SOLVER: Variant = Variant {
         (Guarantee::NoAllocation, "matrices are as large as the scene"),
         (Guarantee::Rest, "large scenes have 8 sweeps, too few for tall stacks"),
     ],
+    islands: Islands::Alone,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

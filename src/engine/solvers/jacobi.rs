@@ -19,7 +19,7 @@
 //! for a body in a pile with three contacts or more. A `relaxation` below 2/λ_max prevents that, but slows
 //! down everything else.
 
-use super::{Guarantee, Uses, Variant};
+use super::{Guarantee, Islands, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::{Soft, angular_frequencies};
 use crate::constraints::{ImpactLaw, Passes, Solver};
@@ -52,6 +52,7 @@ pub static SOLVER: Variant = Variant {
         (Guarantee::Rest, "diverges where a body has three contacts or more"),
     ],
     impacts: ImpactLaw::BOX2D,
+    islands: Islands::Alone,
     make: Variant::made_by(|| Box::new(Jacobi::default())),
     ..Variant::BASE
 };

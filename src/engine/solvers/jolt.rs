@@ -31,7 +31,7 @@
 
 mod sweep;
 
-use super::{Guarantee, Uses, Variant};
+use super::{Guarantee, Islands, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Rigid;
 use crate::constraints::kernels::velocity::sweep::Sweep;
@@ -62,7 +62,7 @@ pub static SOLVER: Variant = Variant {
         (Guarantee::Converges, "one friction row a contact, which is another law"),
         (Guarantee::Rest, "10 sweeps are too few for tall stacks and large mass ratios"),
     ],
-    is_local: true,
+    islands: Islands::Apart,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -16,7 +16,7 @@
 //!
 //! **Fails when** loads must travel far, which takes sweeps over all contacts.
 
-use super::{Guarantee, Variant};
+use super::{Guarantee, Islands, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::{Passes, Schedule, SweepOrder};
@@ -43,6 +43,7 @@ pub static SOLVER: Variant = Variant {
         Guarantee::Rest,
         "4 sweeps over all contacts are too few for tall stacks and large mass ratios",
     )],
+    islands: Islands::Alone,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -25,7 +25,7 @@
 //! (m/n) = m. Neither raises the energy ½ λᵀ K λ + bᵀ λ. Momentum is conserved: copies get Δλ/(m/n) each, and
 //! the body gets the mean, Σ Δλ/m.
 
-use super::{Guarantee, Uses, Variant};
+use super::{Guarantee, Islands, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::masses::ScaledMasses;
 use crate::constraints::kernels::velocity::rules::{Soft, angular_frequencies};
@@ -49,6 +49,7 @@ pub static SOLVER: Variant = Variant {
         (Guarantee::Rest, "12 slow sweeps are too few for stacks"),
     ],
     impacts: ImpactLaw::BOX2D,
+    islands: Islands::Alone,
     make: Variant::made_by(|| Box::new(MassSplitting::default())),
     ..Variant::BASE
 };

@@ -208,9 +208,8 @@ pub struct Variant {
     pub frozen: Option<FreezeLimits>,
     /// Default of [continuous collision](crate::continuous).
     pub continuous: bool,
-    /// Whether islands do not see each other, and nothing but impulses is kept from step to step: groups of islands may be
-    /// solved apart.
-    pub is_local: bool,
+    /// Whether islands see each other.
+    pub islands: Islands,
     /// Numbers kept from step to step, in addition to impulses.
     pub kept: StateSize,
     /// Why it does not support joints, if it does not.
@@ -219,6 +218,18 @@ pub struct Variant {
     pub exceptions: &'static [(Guarantee, &'static str)],
     /// Creates the solver of a world: its schedule and its state.
     pub make: fn() -> Box<dyn Solver>,
+}
+
+/// Whether islands, which do not touch, see each other in the arithmetic of a solver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Islands {
+    /// They do not, however many it is given.
+    Apart,
+    /// It couples all that it is given, for example by a common step length or a norm. So it is given one at a time, except in
+    /// worlds with joints.
+    Alone,
+    /// It couples all, and keeps more than impulses from step to step. It is given the whole world.
+    Together,
 }
 
 /// Errors: a value out of the parameter's range.
@@ -253,7 +264,7 @@ impl Variant {
         impacts: ImpactLaw::Bias,
         frozen: None,
         continuous: false,
-        is_local: false,
+        islands: Islands::Together,
         kept: StateSize::NONE,
         joints_unsupported: None,
         exceptions: &[],

@@ -36,7 +36,7 @@
 //! An edge with a non-positive denominator is never reached: there the bound µ x grows at least as fast as
 //! |y| (the case of Painlevé's rod). If r ≤ 0 the point does not touch, and both impulses are zero.
 
-use super::{Guarantee, Variant};
+use super::{Guarantee, Islands, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::frame::{
     BodyPair, DX, DY, TURN, arms, separation, spin, to_frame, turn, with_arms,
@@ -61,6 +61,7 @@ pub static SOLVER: Variant = Variant {
     summary: "block Gauss–Seidel: load and friction of each point solved together, exactly",
     parameters: &[Parameter::BAUMGARTE],
     exceptions: &[(Guarantee::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
+    islands: Islands::Alone,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -15,7 +15,7 @@
 //! **Fails when** there are too few sweeps for the height of a stack, as with [`super::pgs`]. The residual of
 //! the sweeps stays in the velocities, and two position sweeps correct little of the resulting overlap.
 
-use super::{Guarantee, Uses, Variant};
+use super::{Guarantee, Islands, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Rigid;
 use crate::constraints::{Passes, PositionSweep, Schedule};
@@ -30,7 +30,7 @@ pub static SOLVER: Variant = Variant {
     uses: Uses { velocity: true, relax: false, position: true },
     parameters: &[Parameter::CORRECTION],
     exceptions: &[(Guarantee::Rest, "4 sweeps are too few for stacks")],
-    is_local: true,
+    islands: Islands::Apart,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -15,7 +15,7 @@
 //! **Fails when** loads must travel far: the block couples the two points of a contact, not two contacts, so
 //! convergence over a stack is that of [`super::pgs`].
 
-use super::{Guarantee, Uses, Variant};
+use super::{Guarantee, Islands, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Soft;
 use crate::constraints::{Passes, PositionSweep, Schedule};
@@ -33,7 +33,7 @@ pub static SOLVER: Variant = Variant {
         (Guarantee::Cone, "friction rows come first, bounded by the normal impulses before the sweep"),
         (Guarantee::Rest, "4 sweeps are too few for stacks"),
     ],
-    is_local: true,
+    islands: Islands::Apart,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

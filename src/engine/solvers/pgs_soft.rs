@@ -14,7 +14,7 @@
 //! **Fails when** stacks are tall: the sweeps of one step do not carry a load through them. At a third of the
 //! step rate, a spring is only as stiff as 20 Hz.
 
-use super::{Guarantee, Uses, Variant};
+use super::{Guarantee, Islands, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
 use crate::constraints::{ImpactLaw, Passes, Schedule};
@@ -32,7 +32,7 @@ pub static SOLVER: Variant = Variant {
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION_OF_STEP, h)),
     exceptions: &[(Guarantee::Rest, "6 sweeps without substeps are too few for stacks")],
     impacts: ImpactLaw::BOX2D,
-    is_local: true,
+    islands: Islands::Apart,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -17,7 +17,7 @@
 //! warm start of the next substep, and grows in pyramids (`papers/solver2d.md`); a second sweep damps it.
 //! Baumgarte's push adds energy, as in [`super::pgs`].
 
-use super::Variant;
+use super::{Islands, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::{Passes, Schedule};
@@ -30,7 +30,7 @@ pub static SOLVER: Variant = Variant {
     summary: "rigid sequential impulses in substeps",
     budget: Budget { substeps: 8, velocity_iterations: 2, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
-    is_local: true,
+    islands: Islands::Apart,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

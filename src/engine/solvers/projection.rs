@@ -15,7 +15,7 @@
 //! **Fails when** anything should slide, roll or lean: there is no friction. Without warm starting, every
 //! step starts from zero impulses, so tall stacks sink and spread.
 
-use super::{Guarantee, Uses, Variant};
+use super::{Guarantee, Islands, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Touching;
 use crate::constraints::{ImpactLaw, Passes, PositionSweep, Schedule};
@@ -30,7 +30,7 @@ pub static SOLVER: Variant = Variant {
     uses: Uses { velocity: true, relax: false, position: true },
     exceptions: &[(Guarantee::Rest, "no friction and no warm starting")],
     impacts: ImpactLaw::None,
-    is_local: true,
+    islands: Islands::Apart,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -16,7 +16,7 @@
 //!
 //! **Fails when** [`super::pgs`] does: changes travel no further per sweep.
 
-use super::{Guarantee, Variant};
+use super::{Guarantee, Islands, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::{Passes, Schedule, SweepOrder};
@@ -40,6 +40,7 @@ pub static SOLVER: Variant = Variant {
         },
     ],
     exceptions: &[(Guarantee::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
+    islands: Islands::Alone,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

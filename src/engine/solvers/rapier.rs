@@ -16,7 +16,7 @@
 //!
 //! **Fails when** [`super::soft_step`] does: the block couples the two points of a contact, not two contacts.
 
-use super::{Uses, Variant};
+use super::{Islands, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::{Frictionless, Soft, angular_frequencies};
 use crate::constraints::{ImpactLaw, Passes, Schedule};
@@ -35,7 +35,7 @@ pub static SOLVER: Variant = Variant {
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
     impacts: ImpactLaw::RAPIER,
     frozen: Some(FreezeLimits::BOX2D),
-    is_local: true,
+    islands: Islands::Apart,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -31,7 +31,7 @@
 #[doc(hidden)]
 pub mod convex;
 
-use super::{Guarantee, Variant};
+use super::{Guarantee, Islands, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::{ImpactLaw, Passes, Schedule};
@@ -76,6 +76,7 @@ pub static SOLVER: Variant = Variant {
         (Guarantee::NoAllocation, "matrices are as large as the scene"),
     ],
     impacts: ImpactLaw::None,
+    islands: Islands::Alone,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -39,7 +39,7 @@
 //! rate. Contacts with static bodies have twice the frequency of the others, so the others have at most half of this.
 //! An eighth, as in the source, is 0.79 of √2 in a pile, and 1.57 at a static body, where κ is near 1 and a row is solved in one sweep.
 
-use super::{Guarantee, Uses, Variant};
+use super::{Guarantee, Islands, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::impacts::spread::VISITS;
 use crate::constraints::joints::chains::{ChainStage, Chains};
@@ -80,7 +80,7 @@ pub static SOLVER: Variant = Variant {
     impacts: ImpactLaw::Solver { per_contact: 0, per_point: 0 },
     frozen: Some(FreezeLimits::LOADED),
     continuous: true,
-    is_local: true,
+    islands: Islands::Apart,
     make: Variant::made_by(|| Box::new(Shim::default())),
     ..Variant::BASE
 };

@@ -18,7 +18,7 @@
 //! number of iterations, so tall stacks and heavy bodies on light ones sag. More substeps allow a higher
 //! frequency, and the sag falls with the square of the frequency.
 
-use super::{Uses, Variant};
+use super::{Islands, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::{Rigid, Soft, angular_frequencies};
 use crate::constraints::{ImpactLaw, Passes, Schedule};
@@ -35,7 +35,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[Parameter::CONTACT_HERTZ, Parameter::DAMPING_RATIO, Parameter::PUSH_SPEED],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
     impacts: ImpactLaw::BOX2D,
-    is_local: true,
+    islands: Islands::Apart,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -14,7 +14,7 @@
 //! point of a box is half of the first), and from ω = 2 on nothing converges. With few sweeps, a large ω
 //! leaves larger errors than no over-relaxation.
 
-use super::{Guarantee, Variant};
+use super::{Guarantee, Islands, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::{Passes, Schedule};
@@ -38,7 +38,7 @@ pub static SOLVER: Variant = Variant {
         },
     ],
     exceptions: &[(Guarantee::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
-    is_local: true,
+    islands: Islands::Apart,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

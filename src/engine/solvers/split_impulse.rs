@@ -16,7 +16,7 @@
 //! **Fails when** [`super::pgs`] does, except that it does not throw overlapping bodies apart. The residual
 //! of the velocity sweeps stays in the velocities, and pseudo-velocities start at zero in each step.
 
-use super::{Guarantee, Uses, Variant};
+use super::{Guarantee, Islands, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::{Rigid, Soft};
 use crate::constraints::{Passes, Solver};
@@ -35,7 +35,7 @@ pub static SOLVER: Variant = Variant {
         ..Parameter::CORRECTION
     }],
     exceptions: &[(Guarantee::Rest, "8 sweeps are too few for tall stacks and large mass ratios")],
-    is_local: true,
+    islands: Islands::Apart,
     make: Variant::made_by(|| Box::new(SplitImpulse::default())),
     ..Variant::BASE
 };

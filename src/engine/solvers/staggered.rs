@@ -29,7 +29,7 @@
 //!
 //! [`spectral`]: crate::constraints::vectors::spectral
 
-use super::{Guarantee, Variant};
+use super::{Guarantee, Islands, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::kernels::velocity::sweep::Sweep;
@@ -60,6 +60,7 @@ pub static SOLVER: Variant = Variant {
         Guarantee::Converges,
         "to the law of `pgs` where rounds settle, but roundings grow in its inner iterations",
     )],
+    islands: Islands::Alone,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -16,7 +16,7 @@
 //! its size per iteration, and to 0.976 per plain sweep: no gain per sweep. In colored order, changes travel
 //! one contact per sweep in either direction.
 
-use super::{Guarantee, Variant};
+use super::{Guarantee, Islands, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Baumgarte;
 use crate::constraints::{Passes, Schedule, SweepOrder};
@@ -30,7 +30,7 @@ pub static SOLVER: Variant = Variant {
     budget: Budget { substeps: 1, velocity_iterations: 4, relax_iterations: 0, position_iterations: 0 },
     parameters: &[Parameter::BAUMGARTE],
     exceptions: &[(Guarantee::Rest, "8 sweeps in 4 pairs are too few for tall stacks and large mass ratios")],
-    is_local: true,
+    islands: Islands::Apart,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -15,7 +15,7 @@
 //! **Fails when** the budget is small: contacts are rigid and there is no relaxing sweep, so the residual of
 //! a sweep stays in the velocities and stacks jitter.
 
-use super::{Guarantee, Uses, Variant};
+use super::{Guarantee, Islands, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::Rigid;
 use crate::constraints::{ImpactLaw, Passes, PositionSweep, Schedule};
@@ -31,7 +31,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[Parameter::CORRECTION],
     exceptions: &[(Guarantee::Rest, "jitters at its standard budget")],
     impacts: ImpactLaw::BOX2D,
-    is_local: true,
+    islands: Islands::Apart,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

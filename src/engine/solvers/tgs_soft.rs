@@ -15,7 +15,7 @@
 //! **Fails when** [`super::soft_step`] does. The benefit shows only where bodies turn by more than a few
 //! degrees within a step; the cost is always paid.
 
-use super::{Uses, Variant};
+use super::{Islands, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::kernels::velocity::rules::{Soft, angular_frequencies};
 use crate::constraints::{ImpactLaw, Passes, Schedule};
@@ -32,7 +32,7 @@ pub static SOLVER: Variant = Variant {
     parameters: &[Parameter::CONTACT_HERTZ, Parameter::push_speed(4.0)],
     softness: Some(|parameters, h| angular_frequencies(parameters[0], CONTACT_HERTZ_FRACTION, h)),
     impacts: ImpactLaw::BOX2D,
-    is_local: true,
+    islands: Islands::Apart,
     make: Variant::made_by(|| Schedule::boxed(step)),
     ..Variant::BASE
 };

@@ -21,7 +21,7 @@
 
 mod displace;
 
-use super::{Guarantee, Uses, Variant};
+use super::{Guarantee, Islands, Uses, Variant};
 use crate::clock::Phase;
 use crate::constraints::{ImpactLaw, Passes, PointVector, Solver, Workspace};
 use crate::lanes::BodyRow;
@@ -54,7 +54,7 @@ pub static SOLVER: Variant = Variant {
         (Guarantee::Rest, "no warm start"),
     ],
     impacts: ImpactLaw::Solver { per_contact: 0, per_point: 2 },
-    is_local: true,
+    islands: Islands::Apart,
     make: Variant::made_by(|| Box::new(Xpbd::default())),
     ..Variant::BASE
 };

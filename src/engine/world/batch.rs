@@ -7,6 +7,7 @@ use crate::broadphase::{BroadPhase, Spaces};
 use crate::contacts::Contact;
 use crate::error::Error;
 use crate::joints::Joint;
+use crate::solvers::Islands;
 use crate::workers::Workers;
 use crate::world::{Order, Settings};
 use std::ops::Range;
@@ -94,7 +95,7 @@ impl Batch {
         if copies == 0 {
             return Err(Error::invalid("copies", "must be at least 1"));
         }
-        if !settings.solver.is_local {
+        if settings.solver.islands == Islands::Together {
             let message =
                 format!("{} solves copies together, so they would see each other", settings.solver.name);
             return Err(Error::invalid("solver", message));
@@ -115,12 +116,18 @@ impl Batch {
             _ => None,
         };
         let (mut rooms, mut joints, mut world) = (Vec::new(), Vec::new(), empty());
+        let has_joints =
+            |world: &World| settings.solver.islands == Islands::Alone && world.joints().next().is_some();
         for copy in 0..copies {
             let invalid = |message: String| Error::invalid(format!("copy {copy}"), message);
             let (before, first_joint, spaces) =
                 (world.bodies.len(), world.joints().count(), spaces_of(&world));
             joints.push(first_joint as u32);
             build(copy, &mut world).map_err(|e| e.within(&format!("copy {copy}")))?;
+            if has_joints(&world) {
+                let message = format!("{} solves copies with joints together", settings.solver.name);
+                return Err(Error::invalid("solver", message));
+            }
             if !world.slots.removed.is_empty() {
                 return Err(invalid("removes a body that it has added".into()));
             }

@@ -13,13 +13,14 @@
 use super::World;
 use crate::bodies::{Bodies, BodyKind};
 use crate::clock::{Clock, Timings};
+use crate::constraints::kernels::observe::ObservedRule;
 use crate::constraints::records::batches::Batches;
 use crate::constraints::step::assign::{Assignment, Sides};
 use crate::constraints::{Features, PartnerKind, Solver, StepInput, WorkCount, Workspace};
 use crate::contacts::Contact;
 use crate::disjoint::DisjointSets;
 use crate::lanes::{BodyRow, LaneWidth, Shared, SharedRows};
-use crate::solvers::{self, Variant};
+use crate::solvers::{self, Islands, Variant};
 use crate::workers::Workers;
 
 /// Weight of a contact; that of a body is 1.
@@ -45,8 +46,8 @@ pub(super) struct Groups {
     list: Vec<Group>,
     /// One for each thread.
     seats: Vec<Seat>,
-    /// Widths, features and size that the lanes of `list` were assigned for.
-    lanes_are_for: Option<([LaneWidth; 2], Features, usize)>,
+    /// Widths, features, size and kind of islands that the lanes of `list` were assigned for.
+    lanes_are_for: Option<([LaneWidth; 2], Features, usize, Islands)>,
     /// Number of groups of the last step; 0 if it was solved as a whole.
     count: usize,
     islands: DisjointSets,
@@ -81,6 +82,8 @@ struct Group {
     kinematic: Vec<(u32, BodyRow)>,
     count: WorkCount,
     timings: Timings,
+    /// The rule of its last velocity sweep, if observed.
+    rule: Option<ObservedRule>,
 }
 
 /// Where a thread solves its groups.
@@ -103,6 +106,17 @@ struct Whole<'a> {
     variant: &'static Variant,
 }
 
+/// How islands are divided.
+#[derive(Clone, Copy, Debug)]
+struct Division {
+    /// Number of contacts in a group.
+    size: usize,
+    /// Least number of groups.
+    least: usize,
+    /// Whether each island with contacts is a group of its own, if there is another island.
+    alone: bool,
+}
+
 impl Groups {
     /// Whether the step is solved in groups.
     pub fn are_in_use(&self) -> bool {
@@ -123,15 +137,9 @@ impl Groups {
         self.in_use().iter().map(|group| group.lanes.width()).max().unwrap_or(1)
     }
 
-    /// Divides islands into groups of about `size` contacts. `false`, and no groups, if a single island has most contacts or
-    /// there would be fewer than `least` groups. Bodies that are asleep are in none.
-    fn divide(
-        &mut self,
-        [size, least]: [usize; 2],
-        kinds: &[BodyKind],
-        contacts: &[Contact],
-        asleep: &[bool],
-    ) -> bool {
+    /// Divides islands into groups. `false`, and no groups, if the division does not pay. Bodies that are asleep are in none.
+    fn divide(&mut self, by: Division, kinds: &[BodyKind], contacts: &[Contact], asleep: &[bool]) -> bool {
+        let Division { size, least, alone } = by;
         let Groups { list, count, islands, weights, group_of, row_of, pause, .. } = self;
         let is_dynamic = |body: u32| kinds[body as usize] == BodyKind::Dynamic;
         let sleeps = |body: u32| asleep.get(body as usize).copied().unwrap_or(false);
@@ -142,7 +150,7 @@ impl Groups {
         let room = u32::try_from(size).unwrap_or(u32::MAX).saturating_mul(CONTACT);
         let all = touching().count() as u32 * CONTACT + moving().count() as u32;
         *pause = pause.saturating_sub(1);
-        if all / room < least as u32 || *pause > 0 {
+        if !alone && (all / room < least as u32 || *pause > 0) {
             return false;
         }
         islands.begin(kinds.len());
@@ -155,30 +163,44 @@ impl Groups {
         for body in moving() {
             weights[islands.least(body) as usize] += 1;
         }
-        if 2 * weights.iter().copied().max().unwrap_or(0) > all {
+        if alone {
+            if weights.iter().filter(|&&weight| weight > 0).count() < 2 {
+                return false;
+            }
+        } else if 2 * weights.iter().copied().max().unwrap_or(0) > all {
             *pause = PAUSE;
             return false;
         }
         group_of.clear();
         group_of.resize(kinds.len(), NONE);
         let (mut group, mut weight) = (0, 0);
+        // Islands of the first group have no contacts, so nothing couples them.
+        let opens = |weight, own| if alone { own > 1 } else { weight > 0 && weight + own > room };
+        if alone {
+            list.resize_with(list.len().max(1), Group::default);
+            list[0].begin();
+        }
         for body in moving() {
             let least = islands.least(body);
             if least == body {
                 let own = weights[body as usize];
-                if weight > 0 && weight + own > room {
+                if opens(weight, own) {
                     (group, weight) = (group + 1, 0);
                 }
                 weight += own;
                 if list.len() <= group {
                     list.push(Group::default());
                 }
-                if weight == own {
+                if weight == own && (group > 0 || !alone) {
                     list[group].begin();
                 }
                 list[group].is_large |= own > 2 * room;
             }
-            group_of[body as usize] = if least == body { group as u32 } else { group_of[least as usize] };
+            group_of[body as usize] = match (least == body, alone && weights[least as usize] == 1) {
+                (true, false) => group as u32,
+                (true, true) => 0,
+                (false, _) => group_of[least as usize],
+            };
             list[group_of[body as usize] as usize].bodies.push(body);
         }
         for (i, contact) in touching() {
@@ -281,6 +303,7 @@ impl Group {
         work.rows.extend(bodies.iter().map(|&body| rows.get(body as usize)));
         work.rows.push(BodyRow::default());
         work.motion.select(&of.work.motion, bodies, |body| of.bodies.round[body]);
+        work.observe = of.work.observe;
         work.speed_limits.clear();
         for &(body, limit) in &of.work.speed_limits {
             work.speed_limits.extend(bodies.binary_search(&body).ok().map(|row| (row as u32, limit)));
@@ -301,6 +324,7 @@ impl Group {
         };
         self.count = solvers::run(solver.as_mut(), work, copies, &mut clock, &input, width);
         self.timings = clock.stop();
+        self.rule = work.last_rule.take();
         work.motion.finish(&mut work.rows);
         self.kinematic.clear();
         for ((row, &body), kind) in work.rows.iter().zip(&*bodies).zip(&*kinds) {
@@ -318,17 +342,33 @@ impl Group {
     }
 }
 
+/// The rule of the last velocity sweeps of all groups, for `rows` rows; `None` without any.
+fn rule_of(list: &mut [Group], rows: usize) -> Option<ObservedRule> {
+    let mut rules = list.iter_mut().filter_map(|group| Some((group.rule.take()?, &group.bodies)));
+    let (mut rule, bodies) = rules.next()?;
+    let mut deltas = vec![[0.0; 4]; rows];
+    let mut spread = |own: &[[f32; 4]], bodies: &[u32]| {
+        bodies.iter().zip(own).for_each(|(&body, &delta)| deltas[body as usize] = delta);
+    };
+    spread(&rule.deltas, bodies);
+    rules.for_each(|(rule, bodies)| spread(&rule.deltas, bodies));
+    rule.deltas = deltas;
+    Some(rule)
+}
+
 impl World {
     /// Divides the step into groups if that pays, and assigns their lanes.
     pub(super) fn group_islands(&mut self, features: &Features) -> bool {
         let World { groups, settings, bodies, contacts, work, sleep, .. } = self;
-        let choice = Some((settings.widths(), *features, settings.group_size));
+        let choice = Some((settings.widths(), *features, settings.group_size, settings.solver.islands));
         if groups.lanes_are_for != choice {
             groups.list.clear();
             groups.lanes_are_for = choice;
         }
         let least = if work.workers.count() > 1 { LEAST_SHARED } else { LEAST_ALONE };
-        if !groups.divide([settings.group_size, least], &bodies.kind, contacts, sleep.asleep()) {
+        let alone = settings.solver.islands == Islands::Alone;
+        let by = Division { size: settings.group_size, least, alone };
+        if !groups.divide(by, &bodies.kind, contacts, sleep.asleep()) {
             return false;
         }
         groups.assign(settings.widths(), features, &work.workers);
@@ -380,6 +420,7 @@ impl World {
             count.unsolved += group.count.unsolved;
         }
         (work.rows, work.workers) = (rows, workers);
+        work.last_rule = rule_of(list, work.rows.len());
         clock.divide(list.iter().map(|group| &group.timings));
         count
     }

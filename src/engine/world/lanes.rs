@@ -3,19 +3,37 @@
 use super::{Order, World};
 use crate::constraints::step::assign::Sides;
 use crate::constraints::{Features, PartnerKind};
+use crate::lanes::LaneWidth;
+
+/// What an assignment of lanes depends on besides the contacts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct LanesFor {
+    solver: &'static str,
+    widths: [LaneWidth; 2],
+    order: Order,
+    features: Features,
+    /// `None` if the world is not divided into groups.
+    group_size: Option<usize>,
+}
 
 impl World {
     /// Assigns every contact to a lane. The last step's lanes are reused while the set of contacts is the
     /// same.
     pub(super) fn assign_lanes(&mut self, features: &Features) {
         let widths = self.settings.widths();
-        let group_size = self.group_size();
-        let choice = Some((self.solver_is.name, widths, self.settings.order, *features, group_size));
+        let group_size = self.may_divide().then_some(self.settings.group_size);
+        let choice = Some(LanesFor {
+            solver: self.solver_is.name,
+            widths,
+            order: self.settings.order,
+            features: *features,
+            group_size,
+        });
         if !self.narrow.is_changed && self.lanes_are_for == choice {
             return;
         }
         (self.narrow.is_changed, self.lanes_are_for) = (false, choice);
-        if group_size > 0 && self.group_islands(features) {
+        if group_size.is_some() && self.group_islands(features) {
             return;
         }
         self.groups.leave();

@@ -19,13 +19,14 @@ use crate::narrowphase::lanes::{Class, PoseRow};
 use crate::narrowphase::seams::Seams;
 use crate::params::DIVERGED_SPEED;
 use crate::shapes::Shape;
-use crate::solvers::{self, Variant};
+use crate::solvers::{self, Islands, Variant};
 use candidates::ignores;
 use collide::Narrow;
 use edit::{Slots, StandingForces, Target};
 use events::Events;
 use groups::Groups;
 use joints::JointSlots;
+use lanes::LanesFor;
 use sleep::Sleep;
 use std::fmt;
 use std::ops::Range;
@@ -142,8 +143,8 @@ pub struct World {
     continuous: Continuous,
     /// Whether bodies were added or removed since `continuous` was built.
     continuous_is_stale: bool,
-    /// Solver, widths, order, features and size of groups that the current lanes were assigned for.
-    lanes_are_for: Option<(&'static str, [LaneWidth; 2], Order, Features, usize)>,
+    /// What the current lanes were assigned for.
+    lanes_are_for: Option<LanesFor>,
     /// Length of the substep that the impulses of `contacts` belong to (s); `None` before the first step.
     impulses_of: Option<f32>,
     /// The active solver, and the variant that created it.
@@ -160,6 +161,8 @@ pub struct World {
     events: Events,
     joints: JointSlots,
     sleep: Sleep,
+    /// Whether this is a [`Self::frozen_step`].
+    is_frozen: bool,
 }
 
 impl fmt::Debug for World {
@@ -223,6 +226,7 @@ impl World {
             events: Events::default(),
             joints: JointSlots::default(),
             sleep: Sleep::default(),
+            is_frozen: false,
             settings,
         }
     }
@@ -354,10 +358,10 @@ impl World {
     pub fn frozen_step(&mut self) {
         let mut clock = Clock::start(self.settings.timed);
         self.pairs_are_stale = true;
-        let group_size = std::mem::take(&mut self.settings.group_size);
+        self.is_frozen = true;
         self.set_workers();
         self.solve(&mut clock);
-        self.settings.group_size = group_size;
+        self.is_frozen = false;
         self.timings = clock.stop();
     }
 
@@ -464,15 +468,20 @@ impl World {
         solvers::run(self.solver.as_mut(), &mut self.work, &mut self.contacts, clock, &input, width)
     }
 
-    /// Number of contacts in a group of islands; 0 if islands are not solved in groups.
+    /// Whether islands may be solved apart from each other.
     ///
-    /// Groups are for solvers whose islands do not see each other, and for contacts alone. What looks at the problem of the
-    /// whole world gets it.
-    fn group_size(&self) -> usize {
+    /// Constraints of other types than contacts, iterations that are watched, and other orders than by color need the whole world.
+    fn may_divide(&self) -> bool {
         let s = &self.settings;
-        let is_watched = s.observe_rule || self.work.watch.is_some();
-        let may = self.solver_is.is_local && s.order == Order::Colored && self.work.types.is_empty();
-        if may && !is_watched { s.group_size } else { 0 }
+        let may = match self.solver_is.islands {
+            Islands::Apart => s.group_size > 0,
+            Islands::Alone => true,
+            Islands::Together => false,
+        };
+        may && !self.is_frozen
+            && s.order == Order::Colored
+            && self.work.types.is_empty()
+            && self.work.watch.is_none()
     }
 
     /// Number of lanes per instruction in the last step: as many as the settings allow and the colors fill.

@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::lanes::{LaneWidth, native_width};
 use crate::narrowphase::frozen::{FreezeLimits, Freezing};
 use crate::params::{Budget, Parameters, Without};
-use crate::solvers::{self, Variant};
+use crate::solvers::{self, Islands, Variant};
 
 /// Default of [`Settings::group_size`]: with records of 100 to 200 bytes per contact and copies of 128, groups take half of a
 /// second-level cache of 1 MiB.
@@ -129,7 +129,8 @@ pub struct Settings {
     #[cfg_attr(feature = "serde", serde(default = "super::saved::group_size"))]
     pub group_size: usize,
     /// Islands that have rested for half a second sleep: they are not solved until a body, an edit or a change of gravity
-    /// wakes them. For solvers whose islands do not see each other.
+    /// wakes them. Not for solvers that need the whole world, nor, in worlds with joints, for those
+    /// that need an island alone ([`Variant::islands`]).
     #[cfg_attr(feature = "serde", serde(default))]
     pub sleep: bool,
     /// Extra kernel features to compile in, to measure their cost.
@@ -197,7 +198,7 @@ impl Settings {
             not_negative("frozen.distance", distance.into())?;
             not_negative("frozen.turn", turn.into())?;
         }
-        if self.sleep && !self.solver.is_local {
+        if self.sleep && self.solver.islands == Islands::Together {
             let message = format!("{} solves all islands together, so none can sleep", self.solver.name);
             return Err(Error::invalid("sleep", message));
         }

@@ -26,6 +26,7 @@ use super::World;
 use crate::bodies::{Bodies, BodyKind};
 use crate::disjoint::DisjointSets;
 use crate::narrowphase::Margins;
+use crate::solvers::Islands;
 use glam::Vec2;
 
 /// T (s).
@@ -266,8 +267,8 @@ impl World {
 
     /// Finds which bodies are active. `false` if none is: the step then has nothing to do.
     pub(super) fn begin_sleep(&mut self) -> bool {
-        let is_watched = self.settings.observe_rule || self.work.watch.is_some();
-        if !self.settings.sleep || is_watched {
+        let is_whole = self.settings.solver.islands == Islands::Alone && !self.may_divide();
+        if !self.settings.sleep || is_whole || self.work.watch.is_some() {
             if self.sleep.clear() {
                 self.regroup_awake();
             }
