@@ -2,7 +2,7 @@
 
 use super::output::{note, print, print_json, value};
 use super::progress::Bar;
-use super::run::{RunArgs, how, settings};
+use super::run::{RunArgs, settings};
 use crate::engine::world::Settings;
 use crate::lab::copies::{self, Copies};
 use crate::lab::error::Error;
@@ -11,7 +11,7 @@ use crate::lab::report::ensemble::Interval;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::units::{bodies, percent, si};
 use crate::lab::scenes::Loaded;
-use crate::lab::study::open_scene;
+use crate::lab::study::{budget, open_scene};
 use serde_json::{Value, json};
 use std::process::ExitCode;
 
@@ -52,7 +52,11 @@ pub fn run(args: &RunArgs, count: u32) -> Result<ExitCode, Error> {
         bodies(one.scene.bodies.len()),
         si(one.scene.dt, "s"),
         settings.solver.name,
-        how(&one.scene.build(settings.clone())?)
+        budget::with_treatments(
+            budget::brief(&settings.budget, settings.solver),
+            settings.impacts,
+            settings.frozen
+        )
     );
     let threads =
         if settings.threads > 1 { format!("{} threads", settings.threads) } else { "one thread".into() };

@@ -217,7 +217,7 @@ pub struct Input<'a> {
 /// after the end of `contacts`.
 ///
 /// `found`: the poses at which each contact was found; used if contacts are [frozen](super::frozen), for pairs without
-/// discs.
+/// discs. `results` is memory for several threads.
 ///
 /// # Panics
 /// If a job refers to a body, shape or contact that does not exist, or the lists differ in length.
@@ -228,6 +228,7 @@ pub fn update(
     input: Input,
     contacts: &mut Vec<Contact>,
     found: &mut Vec<Found>,
+    results: &mut Vec<PartResult>,
     change: &mut Change,
 ) -> usize {
     let count = jobs.name.len();
@@ -275,16 +276,18 @@ pub fn update(
     } else {
         // SAFETY: every pair has a contact of its own, and every part its own spare contacts.
         let (of_contacts, of_found) = unsafe { (shared.0.sent(), shared.1.sent()) };
-        let mut results: Vec<(usize, Vec<Changed>)> = (0..parts).map(|_| Default::default()).collect();
-        workers.each(results.iter_mut().enumerate(), |(part, (points, changes))| {
+        results.resize_with(parts.max(results.len()), PartResult::default);
+        let results = &mut results[..parts];
+        workers.each(results.iter_mut().enumerate(), |(part, PartResult { points, changes })| {
+            changes.clear();
             let jobs = part * size..((part + 1) * size).min(count);
             let lists = JobLists(lists.map(|list| list.part(jobs.clone())));
             let room = room((of_contacts.get(), of_found.get()), part);
             *points =
                 run(lists, input, room, &mut |name, contact, found| changes.push((name, *contact, found)));
         });
-        for (of_part, changes) in results {
-            points += of_part;
+        for PartResult { points: of_part, changes } in results {
+            points += *of_part;
             changes.iter().for_each(|(name, contact, found)| change(*name, contact, *found));
         }
     }
@@ -317,6 +320,13 @@ pub type Change<'a> = dyn FnMut(u32, &Contact, Option<Found>) + 'a;
 
 /// The arguments of [`Change`].
 type Changed = (u32, Contact, Option<Found>);
+
+/// What a thread found among the pairs of a part.
+#[derive(Clone, Debug, Default)]
+pub struct PartResult {
+    points: usize,
+    changes: Vec<Changed>,
+}
 
 /// Collides the pairs of one kind, as [`update`].
 type CollideFn = fn(JobLists, Input, Room, &mut Change) -> usize;
