@@ -76,6 +76,15 @@ fn a_steady_step_allocates_nothing() {
     }
 }
 
+#[test]
+fn a_steady_step_of_several_threads_allocates_nothing_in_the_first() {
+    for name in ["large_pyramid", "many_pyramids"] {
+        let settings = Settings { threads: 2, ..common::settings(find("soft_step").unwrap()) };
+        let mut world = common::run(&common::scene(name), settings, 60);
+        assert_eq!(allocations(|| (0..5).for_each(|_| world.step().unwrap())), 0, "{name}");
+    }
+}
+
 /// Events and applied forces allocate in the first steps only.
 #[test]
 fn a_steady_step_with_events_allocates_nothing() {

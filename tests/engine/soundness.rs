@@ -401,7 +401,7 @@ fn collide(kind: PairKind, width: LaneWidth, pairs: u32, contacts: usize, spoil:
         workers: &Workers::default(),
     };
     let mut contacts = vec![Contact::default(); contacts];
-    update(kind, width, &jobs, input, &mut contacts, &mut vec![], &mut |_, _, _| {});
+    update(kind, width, &mut jobs, input, &mut contacts, &mut vec![], &mut |_, _, _| {});
 }
 
 #[test]

@@ -151,6 +151,8 @@ pub struct Jobs {
     pub shapes: [Vec<u32>; 2],
     /// The contact that stores the manifold, or [`NO_CONTACT`].
     pub contact: Vec<u32>,
+    /// What each thread found, for reuse.
+    results: Vec<PartResult>,
 }
 
 /// Least number of pairs that are worth a thread.
@@ -166,7 +168,7 @@ impl Jobs {
     /// Every pair is written after the last kept one, whether kept or not, which avoids a branch.
     #[inline(always)]
     pub fn list(&mut self, pairs: &[u32], mut job: impl FnMut(u32) -> (bool, [u32; 2], [u32; 2], u32)) {
-        let Jobs { name, bodies: [a, b], shapes: [c, d], contact } = self;
+        let Jobs { name, bodies: [a, b], shapes: [c, d], contact, .. } = self;
         let mut lists = [name, a, b, c, d, contact];
         let mut kept = 0;
         {
@@ -217,21 +219,21 @@ pub struct Input<'a> {
 /// after the end of `contacts`.
 ///
 /// `found`: the poses at which each contact was found; used if contacts are [frozen](super::frozen), for pairs without
-/// discs. `results` is memory for several threads.
+/// discs.
 ///
 /// # Panics
 /// If a job refers to a body, shape or contact that does not exist, or the lists differ in length.
 pub fn update(
     kind: PairKind,
     width: LaneWidth,
-    jobs: &Jobs,
+    jobs: &mut Jobs,
     input: Input,
     contacts: &mut Vec<Contact>,
     found: &mut Vec<Found>,
-    results: &mut Vec<PartResult>,
     change: &mut Change,
 ) -> usize {
-    let count = jobs.name.len();
+    let Jobs { name, bodies, shapes, contact, results } = jobs;
+    let count = name.len();
     let below = |list, limit: usize, what: &str| {
         let list = IndexList::new(list);
         assert!(list.entries().len() == count, "{count} pairs, and {what} for {}", list.entries().len());
@@ -241,11 +243,11 @@ pub fn update(
     let made = contacts.len();
     let workers = input.workers;
     assert!(input.displacements.len() == input.poses.len(), "displacements of as many bodies as poses");
-    let [a, b] = jobs.bodies.each_ref().map(|list| below(list, input.poses.len(), "bodies"));
-    let [c, d] = jobs.shapes.each_ref().map(|list| below(list, input.shapes.rows.len(), "shapes"));
+    let [a, b] = bodies.each_ref().map(|list| below(list, input.poses.len(), "bodies"));
+    let [c, d] = shapes.each_ref().map(|list| below(list, input.shapes.rows.len(), "shapes"));
     // [`NO_CONTACT`] is the largest number, so adding one makes it the smallest.
-    let beyond = jobs.contact.iter().fold(0, |most, &i| i.wrapping_add(1).max(most));
-    assert!(jobs.contact.len() == count, "{count} pairs, and contacts for {}", jobs.contact.len());
+    let beyond = contact.iter().fold(0, |most, &i| i.wrapping_add(1).max(most));
+    assert!(contact.len() == count, "{count} pairs, and contacts for {}", contact.len());
     assert!(beyond as usize <= made, "a pair of contact {} of {made}", beyond.wrapping_sub(1));
     let size = workers.part(count, LEAST_PART);
     let parts = count.div_ceil(size).max(1);
@@ -267,7 +269,7 @@ pub fn update(
         #[cfg(not(any(target_feature = "avx512f", feature = "emulated")))]
         LaneWidth::W16 => unreachable!("widths are limited to those of the build"),
     };
-    let lists = [a, b, c, d, IndexList::new(&jobs.name), IndexList::new(&jobs.contact)];
+    let lists = [a, b, c, d, IndexList::new(name), IndexList::new(contact)];
     let shared = (Shared::from(&mut **contacts), Shared::from(&mut **found));
     let room = |(contacts, found), part: usize| Room { contacts, found, made: made + part * spare };
     let mut points = 0;
@@ -323,7 +325,7 @@ type Changed = (u32, Contact, Option<Found>);
 
 /// What a thread found among the pairs of a part.
 #[derive(Clone, Debug, Default)]
-pub struct PartResult {
+struct PartResult {
     points: usize,
     changes: Vec<Changed>,
 }

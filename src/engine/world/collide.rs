@@ -7,7 +7,7 @@ use crate::constraints::step::{Collision, CollisionScene};
 use crate::contacts::Contact;
 use crate::lanes::Quad;
 use crate::narrowphase::Margins;
-use crate::narrowphase::batch::{self, Input, Jobs, NO_CONTACT, PairKind, PartResult, Shapes};
+use crate::narrowphase::batch::{self, Input, Jobs, NO_CONTACT, PairKind, Shapes};
 use crate::narrowphase::candidate::Candidate;
 use crate::narrowphase::circles::Rolling;
 use crate::narrowphase::frozen::Found;
@@ -41,7 +41,6 @@ pub(super) struct Narrow {
     fresh: Vec<(Contact, Option<Found>)>,
     last_contacts: Vec<Contact>,
     last_found: Vec<Found>,
-    results: Vec<PartResult>,
     /// Number of contacts after the last update.
     count: usize,
 }
@@ -142,9 +141,8 @@ impl World {
     fn collide(&mut self, rolling: Option<Rolling>) -> usize {
         let margins = Margins::of(self.settings.length_unit);
         let is_ghost = |contact: &Contact| self.seams.is_ghost(contact, &self.bodies, &self.shapes, margins);
-        let Narrow {
-            candidates, jobs, fresh, is_changed, poses, displacements, shapes, found, results, ..
-        } = &mut self.narrow;
+        let Narrow { candidates, jobs, fresh, is_changed, poses, displacements, shapes, found, .. } =
+            &mut self.narrow;
         let (mut points, mut ghost_points, sleep) = (0, 0, &mut self.sleep);
         let mut change = |name: u32, contact: &Contact, found: Option<Found>| {
             let candidate = &mut candidates[name as usize];
@@ -167,7 +165,7 @@ impl World {
         let input = Input { poses, displacements, rolling, shapes, margins, freezing, workers };
         let (width, contacts) = (self.settings.widths()[1], &mut self.contacts);
         for (kind, jobs) in PairKind::ALL.into_iter().zip(jobs) {
-            points += batch::update(kind, width, jobs, input, contacts, found, results, &mut change);
+            points += batch::update(kind, width, jobs, input, contacts, found, &mut change);
         }
         points - ghost_points
     }

@@ -57,6 +57,8 @@ pub(super) struct Groups {
     group_of: Vec<u32>,
     /// Number of changes of contacts until islands are looked for again.
     pause: u32,
+    /// Those of the workspace while groups are solved.
+    workers: Workers,
     /// Row of each body in the group that is being filled. `[bodies]`
     row_of: Vec<u32>,
 }
@@ -386,17 +388,19 @@ impl World {
     /// Solves every group, after the rows have been loaded.
     pub(super) fn solve_groups(&mut self, clock: &mut Clock, input: &StepInput) -> WorkCount {
         let World { groups, work, contacts, bodies, settings, solver_is, .. } = self;
-        let (mut rows, mut workers) = (std::mem::take(&mut work.rows), std::mem::take(&mut work.workers));
+        let mut rows = std::mem::take(&mut work.rows);
+        std::mem::swap(&mut work.workers, &mut groups.workers);
         let of = Whole { work, bodies, input, timed: settings.timed, variant: solver_is };
-        let (list, seats) = (&mut groups.list[..groups.count], &mut groups.seats);
+        let Groups { list, seats, workers, group_of, count, .. } = groups;
+        let list = &mut list[..*count];
         seats.resize_with(workers.count(), Seat::default);
         {
             let rows = Shared::from(&mut rows[..]);
             let contacts = Shared::from(&mut contacts[..]);
             for group in list.iter_mut().filter(|group| group.is_large) {
-                std::mem::swap(&mut seats[0].work.workers, &mut workers);
+                std::mem::swap(&mut seats[0].work.workers, workers);
                 group.solve(&mut seats[0], rows, contacts, of);
-                std::mem::swap(&mut seats[0].work.workers, &mut workers);
+                std::mem::swap(&mut seats[0].work.workers, workers);
             }
             // SAFETY: a contact and a dynamic body are in one group. Rows of other bodies are only read.
             let (rows, contacts) = unsafe { (rows.sent(), contacts.sent()) };
@@ -409,7 +413,7 @@ impl World {
         let mut count = WorkCount::default();
         for (i, group) in (0..).zip(&*list) {
             for &(body, row) in &group.kinematic {
-                if groups.group_of[body as usize] == i {
+                if group_of[body as usize] == i {
                     rows[body as usize] = row;
                 }
             }
@@ -419,7 +423,8 @@ impl World {
             count.cut_impacts += group.count.cut_impacts;
             count.unsolved += group.count.unsolved;
         }
-        (work.rows, work.workers) = (rows, workers);
+        work.rows = rows;
+        std::mem::swap(&mut work.workers, workers);
         work.last_rule = rule_of(list, work.rows.len());
         clock.divide(list.iter().map(|group| &group.timings));
         count
