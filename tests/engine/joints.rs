@@ -108,8 +108,6 @@ fn joints_keep_the_momenta_of_a_free_chain() {
     }
 }
 
-/// Setting a joint to its current definition changes nothing, impulses included. A joint moved to another
-/// body holds that body as a new joint would.
 /// Fastest body (m/s), fastest spin (rad/s), and linear and angular momentum (N·s, N·m·s).
 fn motion(world: &World) -> [f64; 4] {
     let b = &world.bodies;
@@ -152,6 +150,29 @@ fn joints_that_begin_apart_are_pushed_together_at_a_bounded_speed() {
     }
 }
 
+/// Three boxes in a row, each on a rope that is a third as long as its distance. Every rope adds its push.
+#[test]
+fn ropes_out_of_reach_are_pushed_at_a_bounded_speed() {
+    for solver in ["shim", "soft_step", "xpbd", "box2d", "rapier", "direct", "sap"] {
+        let (mut world, ground) = empty(find(solver).unwrap());
+        world.settings.gravity = [0.0; 2];
+        let mut before = ground;
+        for x in [2.0, 4.0, 6.0] {
+            let body = BodyDef::dynamic([x, 0.0]).with(ShapeDef::rectangle(0.3, 0.3).unwrap());
+            let body = world.add_body(&body).unwrap();
+            let rope = Joint::distance(before, body, [[x - 2.0, 0.0], [x, 0.0]]);
+            world.add_joint(&rope.limits(0.0, 2.0 / 3.0).unwrap()).unwrap();
+            before = body;
+        }
+        let mut fastest = 0.0_f64;
+        for _ in 0..120 {
+            world.step().unwrap();
+            fastest = motion(&world)[0].max(fastest);
+        }
+        assert!(fastest < 1.01 * 3.0 * f64::from(MAX_PUSH_SPEED), "{solver}: {fastest} m/s");
+    }
+}
+
 /// Free bodies at rest whose anchors are apart, and every joint that springs a point to a point (box2d 487).
 #[test]
 fn joints_between_free_bodies_give_no_momentum() {
@@ -179,6 +200,8 @@ fn joints_between_free_bodies_give_no_momentum() {
     }
 }
 
+/// Setting a joint to its current definition changes nothing, impulses included. A joint moved to another
+/// body holds that body as a new joint would.
 #[test]
 fn a_joint_is_changed_between_steps() {
     for solver in ["shim", "soft_step", "pgs"] {
@@ -362,7 +385,12 @@ fn a_tight_chain_on_a_contact_goes_on_with_the_same_bits_and_through_changes_of_
     let post = ShapeDef::rectangle(1.0, 1.0).unwrap();
     world.add_body(&BodyDef::fixed([5.0, 18.5]).with(post)).unwrap();
     let more: Vec<_> = (0..3).map(|i| (i, chain(&mut world, ground, 2 + i, 0.5))).collect();
-    (0..60).for_each(|_| world.step().unwrap());
+    for i in 0..60 {
+        let mut read: World = serde_json::from_str(&serde_json::to_string(&world).unwrap()).unwrap();
+        world.step().unwrap();
+        read.step().unwrap();
+        assert_eq!(read.state_hash(), world.state_hash(), "step {i}");
+    }
     more.iter().for_each(|(i, joints)| world.remove_joint(joints[1 + i % 2]).unwrap());
     let text = serde_json::to_string(&world).unwrap();
     let mut read: World = serde_json::from_str(&text).unwrap();
@@ -618,6 +646,28 @@ fn a_beam_is_one_body_to_what_is_caught_in_it() {
     world.add_body(&BodyDef::dynamic([4.221, 4.8483]).with(ball)).unwrap();
     let made = most_energy_made(&mut world, 2, 120);
     assert!(made < 0.1, "{made} of the energy of rod and ball");
+}
+
+/// A plank of 2 kg, hinged to a wall, lies on a post at a tenth of its length and bears a disc that is hinged to its free end.
+#[test]
+fn a_loaded_plank_rests_on_a_post() {
+    for mass in [10.0, 30.0, 60.0] {
+        let (mut world, wall) = empty(find("shim").unwrap());
+        let post = BodyDef::fixed([0.4, -0.6]).with(ShapeDef::rectangle(0.1, 0.5).unwrap());
+        world.add_body(&post).unwrap();
+        let plank = ShapeDef::rectangle(2.0, 0.1).unwrap().with_density(2.5);
+        let plank = world.add_body(&BodyDef::dynamic([2.0, 0.0]).with(plank)).unwrap();
+        world.add_joint(&Joint::revolute(wall, plank).anchor([0.0; 2])).unwrap();
+        let disc = ShapeDef::circle(0.25).unwrap().with_density(16.0 * mass / std::f64::consts::PI);
+        let disc = world.add_body(&BodyDef::dynamic([4.0, 0.0]).with(disc)).unwrap();
+        world.add_joint(&Joint::revolute(plank, disc).anchor([4.0, 0.0])).unwrap();
+        let mut highest = 0.0_f64;
+        for _ in 0..600 {
+            world.step().unwrap();
+            highest = world.bodies.center(disc.index())[1].max(highest);
+        }
+        assert!(highest < 1e-4, "a disc of {mass} kg rises by {highest} m");
+    }
 }
 
 /// The ball weighs as much as 378 links. Without implicit tension, two substeps leave a gap of 1.9 m.

@@ -81,21 +81,24 @@ fn shapes_slide_over_seams_at_any_angle() {
     }
 }
 
+/// Half of the speed is left at the end; `xpbd`, which has no warm start, comes within 2 % of that.
 #[test]
 fn friction_over_seams_is_that_of_one_piece() {
     let whole = vec![BodyDef::fixed([0.0; 2]).with(line([-4.0, 0.0], [4.0, 0.0], 0.05))];
     for solver in SOLVERS {
         for ground in pieces(0.05) {
-            for slider in &sliders()[..2] {
-                let ends = [&ground, &whole].map(|ground| slide(solver, ground, slider, 0.3, 60)[2]);
-                assert!((ends[0] - ends[1]).abs() < 2e-3, "{solver}: {ends:?} m/s");
+            for (shape, height) in &sliders()[..2] {
+                let slider = (shape.clone().with_friction(0.05), *height);
+                let ends = [&ground, &whole].map(|ground| slide(solver, ground, &slider, 0.3, 60)[2]);
+                let most = if solver == "xpbd" { 1e-2 } else { 2e-3 };
+                assert!(ends[1] > 0.49 && (ends[0] - ends[1]).abs() < most, "{solver}: {ends:?} m/s");
             }
         }
     }
 }
 
-/// Over a corner that falls by 0.05 rad a box goes on; a disc that comes to a slope of 0.3 rad, without gravity, keeps the
-/// part of its velocity along the slope.
+/// Over a corner that falls by 0.05 rad a box goes on; a disc that comes to a slope, without gravity, keeps the part of its
+/// velocity along the slope.
 #[test]
 fn shapes_go_round_corners() {
     for solver in SOLVERS {
@@ -105,17 +108,19 @@ fn shapes_go_round_corners() {
             let [least, rise, end] = slide(solver, std::slice::from_ref(&hill), slider, 0.0, 90);
             assert!(least > 0.98 && rise < 1e-3 && end > 1.2, "{solver}: {least} m/s, {rise} m, {end} m/s");
         }
-        let slope: f64 = 0.3;
-        let ground = BodyDef::fixed([0.0; 2]).with(line([-9.0, 0.0], [0.0, 0.0], 0.0));
-        let ground = ground.with(line([0.0, 0.0], [4.0, 4.0 * slope.tan()], 0.0));
-        let mut world = World::new(Settings { gravity: [0.0; 2], ..Settings::new(find(solver).unwrap()) });
-        world.add_body(&ground).unwrap();
-        let disc =
-            BodyDef::dynamic([-1.0, 0.2]).with_velocity([1.0, 0.0]).with(ShapeDef::circle(0.2).unwrap());
-        let disc = world.add_body(&disc).unwrap().index();
-        (0..120).for_each(|_| world.step().unwrap());
-        let speed = f64::from(world.bodies.velocity(disc).length());
-        assert!((speed - slope.cos()).abs() < 0.01, "{solver}: {speed} m/s for {}", slope.cos());
+        for (slope, radius, speed) in [(0.3_f64, 0.2, 1.0), (0.3, 0.2, 3.0), (0.2, 0.1, 3.0)] {
+            let ground = BodyDef::fixed([0.0; 2]).with(line([-9.0, 0.0], [0.0, 0.0], 0.0));
+            let ground = ground.with(line([0.0, 0.0], [9.0, 9.0 * slope.tan()], 0.0));
+            let mut world =
+                World::new(Settings { gravity: [0.0; 2], ..Settings::new(find(solver).unwrap()) });
+            world.add_body(&ground).unwrap();
+            let disc = ShapeDef::circle(radius).unwrap();
+            let disc = BodyDef::dynamic([-1.03, radius]).with_velocity([speed, 0.0]).with(disc);
+            let disc = world.add_body(&disc).unwrap().index();
+            (0..120).for_each(|_| world.step().unwrap());
+            let kept = f64::from(world.bodies.velocity(disc).length()) / speed;
+            assert!((kept - slope.cos()).abs() < 0.01, "{solver}: {kept} of {speed} m/s for {}", slope.cos());
+        }
     }
 }
 
