@@ -58,7 +58,7 @@ impl Scene {
         let points = update(
             self.kind,
             width,
-            &jobs,
+            &mut jobs,
             input,
             &mut self.contacts,
             &mut vec![],
