@@ -11,7 +11,7 @@ use crate::lab::report::ensemble::Interval;
 use crate::lab::report::environment::Environment;
 use crate::lab::report::units::{bodies, percent, si};
 use crate::lab::scenes::Loaded;
-use crate::lab::study::{budget, open_scene};
+use crate::lab::study::{budget, open_scene, seed_of};
 use serde_json::{Value, json};
 use std::process::ExitCode;
 
@@ -27,8 +27,13 @@ struct Figure<'a> {
 pub fn run(args: &RunArgs, count: u32) -> Result<ExitCode, Error> {
     let settings = settings(args, args.setting.settings()?)?;
     let first = args.seed.unwrap_or(1);
-    let last =
-        first.checked_add(u64::from(count) - 1).ok_or_else(|| Error::invalid("seed", "is too large"))?;
+    let last = first
+        .checked_add(u64::from(count) - 1)
+        .ok_or_else(|| Error::invalid("seed", "is too large for as many copies"))?;
+    if let Some((whole, _)) = seed_of(&args.scene) {
+        let message = format!("have a seed each: name the scene '{whole}', and the first seed with --seed");
+        return Err(Error::invalid("copies", message));
+    }
     let open = |seed: u64| open_scene(&format!("{}@{seed}", args.scene), None, args.steps, args.dt);
     let one = open(first)?;
     memory::check("run", one.scene.bodies.len(), 0, 2 * count as usize)?;
@@ -46,8 +51,9 @@ pub fn run(args: &RunArgs, count: u32) -> Result<ExitCode, Error> {
         print_json(&json(args, &one, &settings, &found, &figures, [held, lost])?)?;
         return Ok(ExitCode::SUCCESS);
     }
+    let copies = if count == 1 { "1 copy".into() } else { format!("{count} copies") };
     let mut text = format!(
-        "{}: {count} copies from seeds {first} to {last}, {} each, {steps} steps of {} · {}, {}\n\ncost\n",
+        "{}: {copies} from seeds {first} to {last}, {} each, {steps} steps of {} · {}, {}\n\ncost\n",
         args.scene,
         bodies(one.scene.bodies.len()),
         si(one.scene.dt, "s"),

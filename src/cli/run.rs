@@ -69,7 +69,7 @@ pub struct RunArgs {
     /// Run this many copies from consecutive seeds as one batch, and print means of their errors. Scenes without a random
     /// element differ by small speeds at the start
     #[arg(help_heading = "Scene and time", long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536),
-        conflicts_with_all = ["state", "contacts", "joints", "trace", "picture", "record", "poke", "every"])]
+        conflicts_with_all = ["state", "contacts", "joints", "trace", "picture", "record", "poke", "every", "all"])]
     pub copies: Option<u32>,
     /// Step in seconds [default: that of the scene]
     #[arg(help_heading = "Scene and time", long, value_name = "SECONDS", allow_negative_numbers = true)]
@@ -435,7 +435,7 @@ fn counts(world: &World) -> String {
     let c = world.counts();
     format!(
         "\nlast step: {} pairs, {} contacts, {} points, {} rows, {} sweeps, {} colors, {} overflowing, \
-         {:.0} % of lanes filled, {} bytes of records, {} visits of impacts, {} islands cut off, {} groups of islands, {} bodies asleep, {} threads\n",
+         {} of lanes filled, {} bytes of records, {} visits of impacts, {} islands cut off, {} groups of islands, {} bodies asleep, {} threads\n",
         c.pairs,
         c.contacts,
         c.points,
@@ -443,7 +443,7 @@ fn counts(world: &World) -> String {
         c.sweeps,
         c.colors,
         c.overflow,
-        100.0 * c.contacts as f64 / c.lane_slots.max(1) as f64,
+        if c.asleep > 0 { "–".into() } else { percent(c.contacts as f64 / c.lane_slots.max(1) as f64) },
         c.constraint_bytes,
         c.impact_visits,
         c.cut_impacts,

@@ -184,6 +184,28 @@ fn a_hanging_chain_sleeps_until_its_joint_is_cut() {
     }
 }
 
+#[test]
+fn what_nothing_holds_does_not_sleep_however_slowly_it_falls() {
+    let mut world = World::new(Settings { gravity: [0.0, -0.02], ..sleeping(solvers::SOFT_STEP) });
+    let alone = world.add_body(&unit_box([0.0, 0.0])).unwrap();
+    run(&mut world, 600);
+    assert!((world.body(alone).unwrap().position()[1] + 1.0).abs() < 0.01);
+}
+
+#[test]
+fn settings_that_change_wake_all() {
+    let changes: [fn(&mut Settings); 3] =
+        [|s| s.contact_events = true, |s| s.record_impulses = true, |s| s.dt *= 0.25];
+    for change in changes {
+        let (mut world, _) = stacks(sleeping(solvers::SOFT_STEP));
+        run(&mut world, 150);
+        change(&mut world.settings);
+        world.step().unwrap();
+        assert_eq!(world.counts().asleep, 0);
+        assert_eq!(world.contact_events().len(), if world.settings.contact_events { 6 } else { 0 });
+    }
+}
+
 /// Steps with a ball that rolls, pendulums that swing, and stacks that settle, sleep and are hit. Bits of each body after each
 /// step that neither world has asleep.
 #[test]
@@ -229,35 +251,27 @@ fn bodies_that_are_awake_have_the_same_bits() {
 }
 
 #[test]
-fn a_saved_or_cloned_world_sleeps_on() {
+fn a_clone_sleeps_on() {
     for variant in [solvers::SOFT_STEP, solvers::XPBD] {
         for steps in [20, 70, 150] {
             let (mut world, bodies) = stacks(sleeping(variant));
             run(&mut world, steps);
             // An edit that the next step will find.
             world.bodies.velocity_x[bodies[4].index()] = 2.0;
-            world.bodies.position_y[bodies[0].index()] = -1.5;
-            let text = serde_json::to_string(&world).unwrap();
-            let mut saved: World = serde_json::from_str(&text).unwrap();
             let mut cloned = world.clone();
             for step in 0..120 {
-                for world in [&mut world, &mut saved, &mut cloned] {
-                    world.step().unwrap();
-                }
-                let hashes = [&saved, &cloned].map(|other| (other.state_hash(), other.counts().asleep));
-                assert_eq!(
-                    hashes,
-                    [(world.state_hash(), world.counts().asleep); 2],
-                    "{} {step}",
-                    variant.name
-                );
+                world.step().unwrap();
+                cloned.step().unwrap();
+                let now = |world: &World| (world.state_hash(), world.counts().asleep);
+                assert_eq!(now(&cloned), now(&world), "{} {step}", variant.name);
             }
             assert_eq!(world.counts().asleep, 6);
         }
     }
 }
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, rng_seed: RngSeed::Fixed(11), ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 32, rng_seed: RngSeed::Fixed(11), ..ProptestConfig::default() })]
 
 /// Bodies that are added, removed, thrown and moved at random. A body that sleeps must have a way to the ground through contacts
 /// and joints that are there, and touch nothing that is awake.

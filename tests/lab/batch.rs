@@ -103,6 +103,48 @@ fn carts(copies: usize) -> Batch {
 }
 
 #[test]
+fn a_copy_that_sleeps_has_the_bits_that_it_has_alone_also_after_a_reset() {
+    let build = |world: &mut World| {
+        let peg = world.add_body(&BodyDef::fixed([0.0; 2]))?;
+        let bob = world.add_body(&BodyDef::dynamic([0.0, -0.5]).with(ShapeDef::rectangle(0.1, 0.5)?))?;
+        world.add_joint(&Joint::revolute(peg, bob).anchor([0.0; 2])).map(drop)
+    };
+    let settings = Settings { sleep: true, ..Settings::new(solvers::SOFT_STEP) };
+    let mut all = Batch::new(settings.clone(), 3, |_, world| build(world)).unwrap();
+    (0..70).for_each(|_| drop(all.step().unwrap()));
+    all.reset(1);
+    let mut alone = World::new(settings);
+    build(&mut alone).unwrap();
+    for step in 0..70 {
+        all.step().unwrap();
+        alone.step().unwrap();
+        assert_eq!(all.state_hash(1), alone.state_hash(), "{step}");
+    }
+    assert_eq!(alone.counts().asleep, 1);
+}
+
+#[test]
+fn large_copies_have_worlds_of_their_own() {
+    let pile = |world: &mut World| {
+        world.add_body(&BodyDef::fixed([0.0, -1.0]).with(ShapeDef::rectangle(20.0, 1.0)?))?;
+        for i in 0..80 {
+            let at = [f64::from(i % 8), 0.5 + f64::from(i / 8) * 1.1];
+            world.add_body(&BodyDef::dynamic(at).with(ShapeDef::circle(0.5)?))?;
+        }
+        Ok(())
+    };
+    let mut all = Batch::new(Settings::new(solvers::SHIM), 3, |_, world| pile(world)).unwrap();
+    let mut alone = World::new(Settings::new(solvers::SHIM));
+    pile(&mut alone).unwrap();
+    for _ in 0..40 {
+        all.step().unwrap();
+        alone.step().unwrap();
+    }
+    assert!((0..3).all(|copy| all.state_hash(copy) == alone.state_hash()));
+    assert!(!std::ptr::eq(all.world_of(0).0, all.world_of(1).0));
+}
+
+#[test]
 fn a_reset_starts_joints_again_and_actions_move_their_copy_alone() {
     let (mut all, mut fresh) = (carts(3), carts(3));
     let mut forces = vec![0.0; all.action_len()];

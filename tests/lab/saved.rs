@@ -1,7 +1,7 @@
 //! A saved and reloaded world continues as if nothing had happened.
 
-use simpulse::engine::solvers::VARIANTS;
-use simpulse::engine::world::World;
+use simpulse::engine::solvers::{Islands, VARIANTS};
+use simpulse::engine::world::{Settings, World};
 use simpulse::lab::torture::family;
 
 fn again(world: &World) -> World {
@@ -40,6 +40,30 @@ fn a_saved_jam_goes_on_with_the_same_bits() {
             assert_eq!(world.step(), saved.step(), "driven:{number}, step {step}");
             assert_eq!(saved.state_hash(), world.state_hash(), "driven:{number}, step {step}");
         }
+    }
+}
+
+#[test]
+fn a_saved_world_sleeps_on() {
+    for (variant, steps) in
+        VARIANTS.iter().filter(|v| v.islands == Islands::Apart).zip([20, 70, 150].into_iter().cycle())
+    {
+        let settings = Settings { sleep: true, ..crate::common::settings(variant) };
+        let mut world = crate::common::run(&crate::common::scene("stack:3"), settings, steps);
+        // Edits that the next step will find.
+        let top = world.bodies.len() - 1;
+        match steps {
+            20 => world.bodies.velocity_x[top] = 1.0,
+            70 => world.bodies.position_y[0] -= 0.5,
+            _ => world.remove_body(world.handle(0).unwrap()).unwrap(),
+        }
+        let mut saved = again(&world);
+        for step in 0..120 {
+            assert_eq!(world.step(), saved.step());
+            let now = |world: &World| (world.state_hash(), world.counts().asleep);
+            assert_eq!(now(&saved), now(&world), "{} {step}", variant.name);
+        }
+        assert!(steps != 150 || world.bodies.position_y[top] < -5.0, "{} hovers", variant.name);
     }
 }
 

@@ -226,7 +226,7 @@ pub enum Islands {
     /// They do not, however many it is given.
     Apart,
     /// It couples all that it is given, for example by a common step length or a norm. So it is given one at a time, except in
-    /// worlds with joints.
+    /// worlds with joints, and in other orders than by color.
     Alone,
     /// It couples all, and keeps more than impulses from step to step. It is given the whole world.
     Together,

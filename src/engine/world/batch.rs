@@ -15,6 +15,9 @@ use std::ops::Range;
 /// Number of bodies in a world of a batch. With their contacts they fit a second-level cache of 1 to 2 MiB, and fill the lanes.
 const BODIES: usize = 2500;
 
+/// A copy of more shapes gets a world of its own, whose lanes it fills, and a search for pairs made for many.
+const LARGE: usize = 64;
+
 /// Copies or variants of a scene that never touch. Several are in one world, so that lanes are filled across them: as many as
 /// a cache holds. Threads take a world each.
 ///
@@ -100,22 +103,29 @@ impl Batch {
                 format!("{} solves copies together, so they would see each other", settings.solver.name);
             return Err(Error::invalid("solver", message));
         }
+        if settings.solver.islands == Islands::Alone && settings.order != Order::Colored {
+            let message =
+                format!("of {} must be by color: in others it solves copies together", settings.solver.name);
+            return Err(Error::invalid("order", message));
+        }
         if settings.order == Order::Shuffled {
             return Err(Error::invalid("order", "of a copy would depend on its number, is shuffled"));
         }
         let threads = settings.threads;
         let settings = Settings { threads: 1, ..settings };
-        let empty = || {
+        let empty = |is_large: bool| {
             let mut world = World::new(settings.clone());
-            world.broadphase = BroadPhase::Spaces(Spaces::default());
+            if !is_large {
+                world.broadphase = BroadPhase::Spaces(Spaces::default());
+            }
             world
         };
-        let (mut each, mut bodies) = (copies, 0);
+        let (mut each, mut bodies, mut is_large) = (copies, 0, false);
         let spaces_of = |world: &World| match &world.broadphase {
             BroadPhase::Spaces(spaces) => Some(spaces.len()),
             _ => None,
         };
-        let (mut rooms, mut joints, mut world) = (Vec::new(), Vec::new(), empty());
+        let (mut rooms, mut joints, mut world) = (Vec::new(), Vec::new(), empty(false));
         let has_joints =
             |world: &World| settings.solver.islands == Islands::Alone && world.joints().next().is_some();
         for copy in 0..copies {
@@ -146,6 +156,11 @@ impl Batch {
             let own = world.bodies.len() - before;
             if copy == 0 {
                 (bodies, each) = (own, BODIES.div_ceil(own.max(1)));
+                if world.shapes.len() > LARGE {
+                    each = 1;
+                    is_large = true;
+                    world.broadphase = BroadPhase::new(settings.broadphase);
+                }
             }
             if own != bodies || own == 0 {
                 return Err(invalid(format!("has {own} bodies, and the first copy has {bodies}")));
@@ -155,7 +170,8 @@ impl Batch {
                 if let BroadPhase::Spaces(spaces) = &mut world.broadphase {
                     spaces.close();
                 }
-                let (world, joints) = (std::mem::replace(&mut world, empty()), std::mem::take(&mut joints));
+                let (world, joints) =
+                    (std::mem::replace(&mut world, empty(is_large)), std::mem::take(&mut joints));
                 rooms.push(Room { start: world.bodies.clone(), world, joints, result: Ok(()) });
             }
         }

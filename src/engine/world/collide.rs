@@ -234,6 +234,12 @@ impl Narrow {
         &self.poses
     }
 
+    /// Expects a list of `contacts` contacts.
+    #[cfg(feature = "serde")]
+    pub fn expect(&mut self, contacts: usize) {
+        self.count = contacts;
+    }
+
     /// Whether the caller has changed the list, which now has `contacts` contacts.
     pub fn has_lost(&self, contacts: usize) -> bool {
         self.count != contacts

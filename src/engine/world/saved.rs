@@ -110,7 +110,8 @@ impl Serialize for World {
             contacts: self.contacts.clone(),
             impulses_of: self.impulses_of,
             kept: self.work.kept.clone(),
-            found: self.narrow.found.clone(),
+            // The caller may have changed the list of contacts.
+            found: if self.narrow.has_lost(self.contacts.len()) { vec![] } else { self.narrow.found.clone() },
             of_solver: if is_active { self.solver.kept() } else { Vec::new() },
             applied: self.applied.clone(),
             targets: self.targets.clone(),
@@ -230,9 +231,11 @@ impl SavedWorld {
             return Err(format!("of_solver: are not numbers of {}", world.solver_is.name));
         }
         self.joints.restore(&mut world);
-        world.sleep = self.sleep;
-        world.update_pairs();
         world.contacts = self.contacts;
+        world.narrow.expect(world.contacts.len());
+        world.sleep = self.sleep;
+        world.resume_sleep();
+        world.update_pairs();
         world.narrow.relink(&mut world.contacts);
         Ok(world)
     }

@@ -10,27 +10,30 @@
 //! ```
 //!
 //! An island falls asleep when (1) has held for all its bodies for T, unless it touches or is joined to a body that moves and
-//! is not dynamic. The time begins anew for a body whose support may have gone: it is edited, it is joined to or
+//! is not dynamic, or nothing holds it against gravity. The time begins anew for a body whose support may have gone: it is edited, it is joined to or
 //! touches one that is, or it loses the contact with one that moves. The velocities of the island are then zero, and it has no contacts in any lane; contacts keep their impulses.
 //!
 //! **Waking.** A body is active if it is awake and dynamic, kinematic and moving, or was edited. Pairs without an active
 //! body are not looked at. An island wakes as a whole, within the step, if a contact with an active body is found; if one of its
-//! bodies, or an immovable one that it touches or is joined to, was edited; and if gravity, the solver or the length unit
-//! changed. Edits are found by comparing bodies with what they were, so it does not matter how they were made.
+//! bodies, or an immovable one that it touches or is joined to, was edited; and if a setting changed. Edits are found by comparing bodies with what they were, so it does not matter how they were made.
 //!
 //! Islands do not see each other within a step, so those awake move as they would if none slept, bit for bit.
 //!
 //! **Source:** sleeping islands, Catto 2011 (Box2D 2.2). **Departure:** a bound of the way instead of the speed.
 
-use super::World;
+use super::{Settings, World};
 use crate::bodies::{Bodies, BodyKind};
 use crate::disjoint::DisjointSets;
 use crate::narrowphase::Margins;
-use crate::solvers::Islands;
+use crate::params::{Budget, Parameters, Without};
+use crate::solvers::{Islands, Variant};
 use glam::Vec2;
 
 /// T (s).
 const REST_TIME: f32 = 0.5;
+
+/// Pose of (1) of a body that has not rested.
+const NOWHERE: [f32; 6] = [f32::MAX; 6];
 
 /// A body that brings no change to this step.
 const INACTIVE: u8 = 0;
@@ -38,6 +41,50 @@ const INACTIVE: u8 = 0;
 const LISTED: u8 = 1;
 /// An active body whose pairs are not yet listed.
 const DUE: u8 = 2;
+
+/// The settings that a rest depends on.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct RestedUnder {
+    #[cfg_attr(feature = "serde", serde(with = "super::saved::solver"))]
+    solver: &'static Variant,
+    gravity: [f32; 2],
+    dt: f32,
+    length_unit: f32,
+    budget: Budget,
+    parameters: Parameters,
+    without: Without,
+    record_impulses: bool,
+    contact_events: bool,
+}
+
+impl PartialEq for RestedUnder {
+    fn eq(&self, other: &Self) -> bool {
+        let key = |of: &RestedUnder| {
+            let numbers = (of.gravity, of.dt, of.length_unit, of.budget, of.parameters);
+            (of.solver.name, numbers, of.without, of.record_impulses, of.contact_events)
+        };
+        key(self) == key(other)
+    }
+}
+
+impl RestedUnder {
+    fn of(settings: &Settings) -> Self {
+        let Settings { solver, gravity, dt, length_unit, budget, parameters, without, .. } = *settings;
+        let Settings { record_impulses, contact_events, .. } = *settings;
+        RestedUnder {
+            solver,
+            gravity,
+            dt,
+            length_unit,
+            budget,
+            parameters,
+            without,
+            record_impulses,
+            contact_events,
+        }
+    }
+}
 
 /// Which bodies sleep, and which may soon. Empty while no body may sleep.
 #[derive(Clone, Debug, Default)]
@@ -56,8 +103,8 @@ pub(super) struct Sleep {
     seen: Bodies,
     /// Bodies that were added, removed or changed otherwise than in their arrays since the last step.
     edited: Vec<u32>,
-    /// Gravity, length unit and solver of the last step.
-    balance: Option<([f32; 2], f32, String)>,
+    /// Settings of the last step.
+    rested_under: Option<RestedUnder>,
     /// Whether contacts came or went, or bodies came to rest, since islands were looked at.
     #[cfg_attr(feature = "serde", serde(skip, default = "yes"))]
     is_changed: bool,
@@ -83,6 +130,9 @@ pub(super) struct Sleep {
     islands: DisjointSets,
     #[cfg_attr(feature = "serde", serde(skip))]
     stays: Vec<bool>,
+    /// Whether an immovable body holds a set, by a contact or a joint.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    held: Vec<bool>,
 }
 
 #[cfg(feature = "serde")]
@@ -166,7 +216,7 @@ impl Sleep {
 
     /// Wakes the island of a body with the next [`Self::wake`]. If it is awake, its time of rest begins anew.
     fn disturb(&mut self, body: usize) {
-        self.still[body] = 0.0;
+        (self.still[body], self.from[body]) = (0.0, NOWHERE);
         if self.asleep[body] {
             self.wakes[self.island[body] as usize] = true;
         }
@@ -177,7 +227,8 @@ impl Sleep {
         let before = self.count;
         for i in 0..self.asleep.len() {
             if self.asleep[i] && self.wakes[self.island[i] as usize] {
-                (self.asleep[i], self.still[i], self.state[i], self.fixed[i]) = (false, 0.0, DUE, 0);
+                (self.asleep[i], self.state[i], self.fixed[i]) = (false, DUE, 0);
+                (self.still[i], self.from[i]) = (0.0, NOWHERE);
                 self.count -= 1;
             }
         }
@@ -214,7 +265,7 @@ impl Sleep {
         self.asleep.resize(count, false);
         self.island.resize(count, 0);
         self.still.resize(count, 0.0);
-        self.from.resize(count, [f32::MAX; 6]);
+        self.from.resize(count, NOWHERE);
         self.state.resize(count, INACTIVE);
         self.drives.resize(count, false);
         self.wakes.resize(count, false);
@@ -275,11 +326,8 @@ impl World {
             return true;
         }
         let World { sleep, bodies, settings, contacts, work, .. } = self;
-        let balance = (settings.gravity, settings.length_unit, settings.solver.name);
-        let is_same = sleep.balance.as_ref().is_some_and(|(g, unit, name)| (*g, *unit, &**name) == balance);
-        if !is_same {
-            sleep.balance = Some((balance.0, balance.1, balance.2.into()));
-        }
+        let under = Some(RestedUnder::of(settings));
+        let is_same = std::mem::replace(&mut sleep.rested_under, under) == under;
         sleep.follow(bodies);
         sleep.find_edited(bodies);
         if !is_same || self.narrow.has_lost(contacts.len()) {
@@ -325,6 +373,16 @@ impl World {
         self.sleep.state.iter().any(|&state| state != INACTIVE) || self.pairs_are_stale
     }
 
+    /// After loading: finds what was edited before the world was saved, while its contacts are still there.
+    #[cfg(feature = "serde")]
+    pub(super) fn resume_sleep(&mut self) {
+        self.begin_sleep();
+        let World { sleep, bodies, .. } = self;
+        // The next step looks at the pairs of immovable bodies that were edited.
+        let is_edited = |&i: &usize| bodies.kind[i] != BodyKind::Dynamic && sleep.state[i] != INACTIVE;
+        sleep.edited.extend((0..sleep.state.len()).filter(is_edited).map(|i| i as u32));
+    }
+
     /// Wakes islands that touch an active body; returns whether there are any.
     pub(super) fn wake_touched(&mut self) -> bool {
         if !self.sleep.any() {
@@ -360,7 +418,7 @@ impl World {
 
     /// After a step: lets islands fall asleep that have rested for long enough.
     pub(super) fn end_sleep(&mut self) {
-        let World { sleep, bodies, settings, contacts, work, narrow, .. } = self;
+        let World { sleep, bodies, settings, contacts, work, narrow, gravities, .. } = self;
         self.counts.asleep = sleep.count;
         if sleep.asleep.is_empty() {
             return;
@@ -369,11 +427,13 @@ impl World {
         if !sleep.rest(bodies, &narrow.extents, settings.dt, near) || !std::mem::take(&mut sleep.is_changed) {
             return;
         }
-        let Sleep { asleep, island, still, islands, stays, state, fixed, seen, .. } = sleep;
+        let Sleep { asleep, island, still, islands, stays, held, state, fixed, seen, .. } = sleep;
         islands.begin(bodies.len());
         let joined = work.types.iter().flat_map(|joined| joined.kind.ends().iter().copied());
         let pairs = contacts.iter().map(|contact| [contact.body_a, contact.body_b]).chain(joined);
         let is_free = |body: u32| bodies.kind[body as usize] == BodyKind::Dynamic;
+        held.clear();
+        held.resize(bodies.len(), false);
         stays.clear();
         let each = still.iter().zip(&bodies.kind);
         stays.extend(each.map(|(&still, kind)| *kind != BodyKind::Dynamic || still < REST_TIME));
@@ -382,16 +442,25 @@ impl World {
                 islands.join(a, b);
             } else {
                 let (of, by) = if is_free(b) { (b, a) } else { (a, b) };
-                let is_held = state[by as usize] != INACTIVE;
-                stays[of as usize] |= is_held;
+                let is_driven = state[by as usize] != INACTIVE;
+                (stays[of as usize], held[of as usize]) = (stays[of as usize] || is_driven, true);
                 // It may sleep as soon as the other rests.
-                sleep.is_changed |= is_held;
+                sleep.is_changed |= is_driven;
             }
         }
         for body in 0..bodies.len() {
-            if stays[body] {
-                stays[islands.least(body as u32) as usize] = true;
-            }
+            let least = islands.least(body as u32) as usize;
+            stays[least] |= stays[body];
+            held[least] |= held[body];
+        }
+        // What nothing holds does not rest, however slowly it falls.
+        for body in 0..bodies.len() {
+            let least = islands.least(body as u32) as usize;
+            let gravity = gravities.get(body).copied().unwrap_or(settings.gravity);
+            let falls = bodies.gravity_scale[body] != 0.0 && gravity != [0.0; 2];
+            let pushed =
+                [&bodies.force_x, &bodies.force_y, &bodies.torque].iter().any(|force| force[body] != 0.0);
+            stays[least] |= !held[least] && (falls || pushed);
         }
         let mut any = false;
         for body in 0..bodies.len() {
