@@ -48,8 +48,7 @@ pub fn run(args: &RunArgs, count: u32) -> Result<ExitCode, Error> {
     let lost = found.outcomes.iter().filter(|copy| copy.errors.is_none()).count();
     let held = found.outcomes.iter().filter(|copy| copy.errors.is_some() && copy.broken.is_none()).count();
     if args.json {
-        print_json(&json(args, &one, &settings, &found, &figures, [held, lost])?)?;
-        return Ok(ExitCode::SUCCESS);
+        return print_json(&json(args, &one, &settings, &found, &figures, [held, lost])?);
     }
     let copies = if count == 1 { "1 copy".into() } else { format!("{count} copies") };
     let mut text = format!(
@@ -75,9 +74,7 @@ pub fn run(args: &RunArgs, count: u32) -> Result<ExitCode, Error> {
             Some(interval) => {
                 let [least, most] = [f64::min, f64::max]
                     .map(|pick| values.iter().copied().reduce(pick).map_or(String::new(), show));
-                let half = interval
-                    .ends
-                    .map_or(String::new(), |[low, high]| format!("± {}; ", show(0.5 * (high - low))));
+                let half = interval.half().map_or(String::new(), |half| format!("± {}; ", show(half)));
                 (show(interval.mean), format!("{half}least {least}, greatest {most}"))
             }
         };
@@ -88,8 +85,7 @@ pub fn run(args: &RunArgs, count: u32) -> Result<ExitCode, Error> {
     if !one.scene.joints.is_empty() {
         text += "not checked: joints, energy\n";
     }
-    print(&text)?;
-    Ok(ExitCode::SUCCESS)
+    print(&text)
 }
 
 fn figures<'a>(one: &Loaded, found: &'a Copies) -> Vec<Figure<'a>> {

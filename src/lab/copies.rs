@@ -4,27 +4,14 @@ use crate::engine::batch::Batch;
 use crate::engine::error::Error as Invalid;
 use crate::engine::world::{Settings, StepError, World};
 use crate::lab::error::Error;
-use crate::lab::metrics::{Errors, Observation};
-use crate::lab::scenes::holds::{Broken, SceneMonitor};
-use crate::lab::scenes::{Loaded, Truth};
-use crate::lab::trial::TruthError;
+use crate::lab::scenes::Loaded;
+use crate::lab::trial::{Measured, Measuring};
 use std::time::Instant;
-
-/// What became of a copy.
-#[derive(Clone, Debug)]
-pub struct CopyOutcome {
-    /// Errors over all steps; `None` if it diverged. Those of joints and of energy are not measured.
-    pub errors: Option<Errors>,
-    /// Distance to the known value; `None` if there is none, or the copy diverged.
-    pub truth: Option<TruthError>,
-    /// The first violated condition.
-    pub broken: Option<Broken>,
-}
 
 /// What became of all copies.
 pub struct Copies {
-    /// `[copies]`
-    pub outcomes: Vec<CopyOutcome>,
+    /// Of each copy, but for the errors of joints and of energy. `[copies]`
+    pub outcomes: Vec<Measured>,
     /// Mean time of a step of one copy in the batch (ns), of a run in which nothing was measured.
     pub copy_step_ns: f64,
     /// Whether that run had the same bits.
@@ -35,9 +22,7 @@ pub struct Copies {
 struct Copy<'a> {
     /// The copy alone; it is not stepped.
     mirror: World,
-    monitor: SceneMonitor,
-    observation: Observation,
-    truth: Option<&'a mut Truth>,
+    measuring: Measuring<'a>,
     is_lost: bool,
 }
 
@@ -50,9 +35,9 @@ pub fn run(loaded: &mut [Loaded], settings: &Settings, progress: &dyn Fn(u64)) -
     let mut scenes = Vec::with_capacity(loaded.len());
     for Loaded { scene, truth, demands, .. } in loaded {
         let mirror = scene.build(settings.clone())?;
-        let monitor = SceneMonitor::new(&mirror, demands.clone());
-        let observation = Observation::new(&mirror);
-        copies.push(Copy { mirror, monitor, observation, truth: truth.as_mut(), is_lost: false });
+        let mut measuring = Measuring::new(&mirror, demands.clone(), truth.as_mut());
+        measuring.begin_errors(&mirror);
+        copies.push(Copy { mirror, measuring, is_lost: false });
         scenes.push(&*scene);
     }
     let first = scenes.first().ok_or_else(|| Error::invalid("copies", "there are none"))?;
@@ -68,12 +53,7 @@ pub fn run(loaded: &mut [Loaded], settings: &Settings, progress: &dyn Fn(u64)) -
         measured.step().map_err(failed)?.into_iter().for_each(|copy| copies[copy].is_lost = true);
         for (i, copy) in copies.iter_mut().enumerate().filter(|(_, copy)| !copy.is_lost) {
             measured.read(i, &mut copy.mirror);
-            copy.monitor.observe(&copy.mirror);
-            copy.observation.observe(&copy.mirror);
-            if let Some(truth) = &mut copy.truth {
-                truth.observer.observe(&copy.mirror);
-            }
-            copy.is_lost |= copy.observation.blown_up().is_some();
+            copy.is_lost = copy.measuring.observe(&copy.mirror).is_some();
         }
         progress(step);
     }
@@ -84,11 +64,7 @@ pub fn run(loaded: &mut [Loaded], settings: &Settings, progress: &dyn Fn(u64)) -
         timed.step().map_err(failed)?;
     }
     let elapsed = begun.elapsed().as_secs_f64() * 1e9;
-    let outcomes = copies.into_iter().map(|copy| CopyOutcome {
-        errors: (!copy.is_lost).then(|| copy.observation.errors()),
-        truth: copy.truth.filter(|_| !copy.is_lost).map(|truth| TruthError::of(truth)),
-        broken: copy.monitor.broken(),
-    });
+    let outcomes = copies.into_iter().map(|copy| copy.measuring.end(!copy.is_lost));
     Ok(Copies {
         outcomes: outcomes.collect(),
         copy_step_ns: elapsed / f64::from(first.steps.max(1)) / scenes.len() as f64,
@@ -100,6 +76,7 @@ pub fn run(loaded: &mut [Loaded], settings: &Settings, progress: &dyn Fn(u64)) -
 mod tests {
     use super::*;
     use crate::engine::solvers;
+    use crate::lab::metrics::Errors;
     use crate::lab::study::open_scene;
     use crate::lab::trial::Trial;
 

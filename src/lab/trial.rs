@@ -90,48 +90,92 @@ impl<'a> Trial<'a> {
     ///
     /// Errors: a scene that cannot be built, and those of the observer.
     pub fn run(self, observer: &mut dyn FnMut(&World) -> Result<(), Error>) -> Result<TrialOutcome, Error> {
-        let Trial { scene, settings, demands, mut truth, steps, measured, until_broken, poked } = self;
+        let Trial { scene, settings, demands, truth, steps, measured, until_broken, poked } = self;
         let mut world = scene.build(settings)?;
-        let mut watch = SceneMonitor::new(&world, demands);
+        let mut measuring = Measuring::new(&world, demands, truth);
         let mut pokes = poked.map(|seed| Pokes::new(seed, &world, steps / 2));
-        let (mut observation, mut failure) = (None, None);
+        let mut failure = None;
         observer(&world)?;
         for step in 0..steps {
             if step + measured >= steps {
-                observation.get_or_insert_with(|| Observation::new(&world));
+                measuring.begin_errors(&world);
             }
             if let Some(pokes) = &mut pokes {
                 pokes.act(&mut world)?;
             }
             failure = world.step().err().and_then(StepError::divergence);
+            failure = failure.or_else(|| measuring.observe(&world));
             if failure.is_some() {
                 break;
-            }
-            watch.observe(&world);
-            if let Some(observation) = &mut observation {
-                observation.observe(&world);
-                failure = observation.blown_up();
-            }
-            if failure.is_some() {
-                break;
-            }
-            if let Some(truth) = &mut truth {
-                truth.observer.observe(&world);
             }
             observer(&world)?;
-            if until_broken && watch.broken().is_some() {
+            if until_broken && measuring.monitor.broken().is_some() {
                 break;
             }
         }
-        let well = failure.is_none();
+        let Measured { errors, truth, broken } = measuring.end(failure.is_none());
         Ok(TrialOutcome {
-            errors: observation.filter(|_| well).map(|o| o.errors()),
-            truth: truth.filter(|_| well).map(|truth| TruthError::of(truth)),
-            broken: watch.broken(),
+            errors,
+            truth,
+            broken,
             pokes: pokes.map_or(0, |pokes| pokes.given()),
             failure,
             world,
         })
+    }
+}
+
+/// What is measured of a run.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    /// Errors of the measured steps. `None` if the run diverged, or none was measured.
+    pub errors: Option<Errors>,
+    /// Distance to the known value; `None` if there is none, or the run diverged.
+    pub truth: Option<TruthError>,
+    /// The first violated condition.
+    pub broken: Option<Broken>,
+}
+
+/// Measures a run, step by step.
+pub(super) struct Measuring<'a> {
+    monitor: SceneMonitor,
+    observation: Option<Observation>,
+    truth: Option<&'a mut Truth>,
+}
+
+impl<'a> Measuring<'a> {
+    /// Of a world before its first step.
+    pub fn new(world: &World, demands: Vec<Demand>, truth: Option<&'a mut Truth>) -> Self {
+        Measuring { monitor: SceneMonitor::new(world, demands), observation: None, truth }
+    }
+
+    /// Errors are measured from the next step on.
+    pub fn begin_errors(&mut self, world: &World) {
+        self.observation.get_or_insert_with(|| Observation::new(world));
+    }
+
+    /// Adds a step that did not diverge. Returns kinetic energy without a source, which ends the run.
+    pub fn observe(&mut self, world: &World) -> Option<Divergence> {
+        self.monitor.observe(world);
+        if let Some(observation) = &mut self.observation {
+            observation.observe(world);
+            if let Some(failure) = observation.blown_up() {
+                return Some(failure);
+            }
+        }
+        if let Some(truth) = &mut self.truth {
+            truth.observer.observe(world);
+        }
+        None
+    }
+
+    /// What was measured; `well`: whether the run did not fail.
+    pub fn end(self, well: bool) -> Measured {
+        Measured {
+            errors: self.observation.filter(|_| well).map(|observation| observation.errors()),
+            truth: self.truth.filter(|_| well).map(|truth| TruthError::of(truth)),
+            broken: self.monitor.broken(),
+        }
     }
 }
 

@@ -255,6 +255,11 @@ impl JointKind {
 }
 
 impl Joint {
+    /// Bodies a and b.
+    pub(crate) fn ends(&self) -> [BodyHandle; 2] {
+        [self.a, self.b]
+    }
+
     /// A joint of kind `kind`; its two bodies do not collide with each other.
     pub fn new(a: BodyHandle, b: BodyHandle, kind: JointKind) -> Self {
         Joint { a, b, collide_connected: false, break_load: None, at: None, kind }

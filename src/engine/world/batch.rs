@@ -144,7 +144,7 @@ impl Batch {
             if world.step_index > 0 || spaces_of(&world) != spaces || world.bodies.len() < before {
                 return Err(invalid("steps or replaces the world that it is built in".into()));
             }
-            let ends = |joint: &Joint| [joint.a.index(), joint.b.index()];
+            let ends = |joint: &Joint| joint.ends().map(BodyHandle::index);
             if world.joints().skip(first_joint).any(|(_, joint)| ends(joint).iter().any(|&end| end < before))
             {
                 return Err(invalid("has a joint to a body of another copy".into()));

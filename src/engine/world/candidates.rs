@@ -58,7 +58,7 @@ impl World {
                     contact: NO_CONTACT,
                 },
             };
-            kept += usize::from(candidate.contact != NO_CONTACT);
+            kept += usize::from(candidate.touches());
             narrow.of_kind[kind as usize].push(narrow.candidates.len() as u32);
             narrow.candidates.push(candidate);
         }

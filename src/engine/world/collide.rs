@@ -281,8 +281,8 @@ impl Narrow {
 
     /// Lists the candidates that may touch, given the number of contacts.
     ///
-    /// While some bodies sleep, only pairs that `sleep` lists. If most candidates do not touch, those whose centers are too far apart are skipped before their shapes
-    /// are read. If most touch, the lists of the last step are reused.
+    /// While some bodies sleep, only pairs that `sleep` lists. If most candidates do not touch, those whose centers are
+    /// too far apart are skipped before their shapes are read. If most touch, the lists of the last step are reused.
     fn list_jobs(&mut self, contacts: usize, sleep: Option<&Sleep>) {
         let cull = 4 * contacts < 3 * self.candidates.len();
         if self.jobs_are_current && !cull {
@@ -295,7 +295,7 @@ impl Narrow {
                 let [a, b] = candidate.bodies.map(|body| self.poses[body as usize].position);
                 let d = [(b[0] - a[0]) + (b[2] - a[2]), (b[1] - a[1]) + (b[3] - a[3])];
                 let is_near = d[0] * d[0] + d[1] * d[1] <= candidate.reach_squared;
-                let is_listed = is_near | !cull | (candidate.contact != NO_CONTACT);
+                let is_listed = is_near | !cull | candidate.touches();
                 let is_listed = is_listed & sleep.is_none_or(|sleep| sleep.lists(candidate.bodies));
                 (is_listed, candidate.bodies, candidate.numbers, candidate.contact)
             });
@@ -309,7 +309,7 @@ impl Narrow {
         contacts.clear();
         self.found.clear();
         for candidate in &mut self.candidates {
-            if candidate.contact == NO_CONTACT {
+            if !candidate.touches() {
                 continue;
             }
             let from = (candidate.contact & !FRESH) as usize;

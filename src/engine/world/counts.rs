@@ -29,7 +29,7 @@ pub struct StepCounts {
     pub groups: usize,
     /// Bodies that sleep, see [`Settings::sleep`](super::Settings::sleep).
     pub asleep: usize,
-    /// Lanes in all batches; occupancy is `contacts / lane_slots`.
+    /// Lanes in all batches; occupancy is `contacts / lane_slots` while no body sleeps.
     pub lane_slots: usize,
     /// Bodies that moved farther than half their width; counted only with continuous collision.
     pub fast: usize,

@@ -120,6 +120,7 @@ impl World {
         &self.events.list
     }
 
+    /// Nothing happened in this step; pairs that touch still do.
     pub(super) fn clear_events(&mut self) {
         self.events.list.clear();
     }

@@ -150,9 +150,12 @@ impl Groups {
         let touching = || (0..).zip(contacts).filter(|(_, contact)| !sleeps(contact.body_b));
         *count = 0;
         let room = u32::try_from(size).unwrap_or(u32::MAX).saturating_mul(CONTACT);
-        let all = touching().count() as u32 * CONTACT + moving().count() as u32;
         *pause = pause.saturating_sub(1);
-        if !alone && (all / room < least as u32 || *pause > 0) {
+        if !alone && *pause > 0 {
+            return false;
+        }
+        let all = touching().count() as u32 * CONTACT + moving().count() as u32;
+        if !alone && all / room < least as u32 {
             return false;
         }
         islands.begin(kinds.len());

@@ -68,7 +68,7 @@ impl JointSlots {
 
     /// Replaces the joint at an index.
     fn set(&mut self, index: usize, joint: Option<Joint>) {
-        let ends = |joint: &Joint| [joint.a, joint.b].map(|body| [body.index() as u32, index as u32]);
+        let ends = |joint: &Joint| joint.ends().map(|body| [body.index, index as u32]);
         for end in self.joints[index].iter().flat_map(ends) {
             self.of_body.remove(&end);
         }
@@ -119,7 +119,7 @@ impl World {
         }
         self.traits.spins();
         self.features = self.traits.features();
-        self.edit_ends(&joint);
+        self.edit(joint.ends());
         self.joints_changed();
         Ok(joint)
     }
@@ -128,9 +128,9 @@ impl World {
     ///
     /// Errors: as [`Self::add_joint`]; the joint was removed.
     pub fn set_joint(&mut self, handle: JointHandle, joint: &Joint) -> Result<(), Error> {
-        let old = self.joint(handle)?.clone();
+        let old = self.joint(handle)?.ends();
         let joint = self.admit(joint)?;
-        self.edit_ends(&old);
+        self.edit(old);
         keep_apart(&mut self.joints.apart, &joint);
         self.joints.set(handle.index(), Some(joint));
         Ok(())
@@ -138,10 +138,8 @@ impl World {
 
     /// Removes a joint. Errors: it was removed before.
     pub fn remove_joint(&mut self, handle: JointHandle) -> Result<(), Error> {
-        let joint = self.joint(handle)?.clone();
-        self.edit_ends(&joint);
-        self.joints.remove(handle.index());
-        self.joints_changed();
+        let ends = self.joint(handle)?.ends();
+        self.remove_slot(handle.index(), ends);
         Ok(())
     }
 
@@ -316,11 +314,8 @@ impl World {
         while let Some(&[_, joint]) =
             self.joints.of_body.range([body.index, 0]..=[body.index, u32::MAX]).next()
         {
-            if let Some(joint) = self.joints.joints[joint as usize].clone() {
-                self.edit_ends(&joint);
-            }
-            self.joints.remove(joint as usize);
-            self.joints_changed();
+            let ends = self.joints.joints[joint as usize].as_ref().map_or([body; 2], Joint::ends);
+            self.remove_slot(joint as usize, ends);
         }
     }
 
@@ -333,9 +328,16 @@ impl World {
         }
     }
 
-    /// Wakes the bodies of a joint.
-    fn edit_ends(&mut self, joint: &Joint) {
-        [joint.a, joint.b].iter().for_each(|body| self.sleep.edit(body.index() as u32));
+    /// Removes the joint at an index, which joins these bodies.
+    fn remove_slot(&mut self, index: usize, ends: [BodyHandle; 2]) {
+        self.edit(ends);
+        self.joints.remove(index);
+        self.joints_changed();
+    }
+
+    /// Wakes bodies.
+    fn edit(&mut self, bodies: [BodyHandle; 2]) {
+        bodies.iter().for_each(|body| self.sleep.edit(body.index));
     }
 
     fn joints_changed(&mut self) {

@@ -129,8 +129,9 @@ pub struct Settings {
     #[cfg_attr(feature = "serde", serde(default = "super::saved::group_size"))]
     pub group_size: usize,
     /// Islands that have rested for half a second sleep: they are not solved until a body, an edit or a change of settings
-    /// wakes them. What moves by less than 5 mm in that time counts as at rest, also if a slow motor drives it. Not for solvers that need the whole world, nor, with joints or in other orders than by
-    /// color, for those that need an island alone ([`Variant::islands`]).
+    /// wakes them. What moves by less than 5 mm in that time counts as at rest, also if a slow motor drives it. Not for
+    /// solvers that need the whole world, nor, with joints or in other orders than by color, for those that need an island
+    /// alone ([`Variant::islands`]).
     #[cfg_attr(feature = "serde", serde(default))]
     pub sleep: bool,
     /// Extra kernel features to compile in, to measure their cost.

@@ -1,7 +1,7 @@
 //! Sleep: islands that have rested are not solved until something touches or edits them.
 //!
 //! **Rest.** A body that moves no farther than s within a time T has a mean acceleration below 2 s/T². With the slop, 5 mm,
-//! and T = 0.5 s this is 0.04 m/s², 0.4 % of the weight. So a body whose points have all stayed within s of where they were
+//! and T = 0.5 s this is 0.04 m/s², 0.4 % of the weight on Earth. So a body whose points have all stayed within s of where they were
 //! T ago is in balance to that, whatever it trembles. With the pose (x₀, R₀) at which the time began and the reach r, no
 //! point has moved farther than
 //!
@@ -10,12 +10,14 @@
 //! ```
 //!
 //! An island falls asleep when (1) has held for all its bodies for T, unless it touches or is joined to a body that moves and
-//! is not dynamic, or nothing holds it against gravity. The time begins anew for a body whose support may have gone: it is edited, it is joined to or
-//! touches one that is, or it loses the contact with one that moves. The velocities of the island are then zero, and it has no contacts in any lane; contacts keep their impulses.
+//! is not dynamic, or nothing holds it against gravity. Its velocities are then zero, and its contacts are in no lane, but keep
+//! their impulses. The time begins anew for a body whose support may have gone: it is edited, it is joined to or touches one
+//! that is, or it loses the contact with one that moves.
 //!
 //! **Waking.** A body is active if it is awake and dynamic, kinematic and moving, or was edited. Pairs without an active
 //! body are not looked at. An island wakes as a whole, within the step, if a contact with an active body is found; if one of its
-//! bodies, or an immovable one that it touches or is joined to, was edited; and if a setting changed. Edits are found by comparing bodies with what they were, so it does not matter how they were made.
+//! bodies, or an immovable one that it touches or is joined to, was edited; and if a setting changed. Edits are found by
+//! comparing bodies with what they were, so it does not matter how they were made.
 //!
 //! Islands do not see each other within a step, so those awake move as they would if none slept, bit for bit.
 //!
@@ -23,6 +25,8 @@
 
 use super::{Settings, World};
 use crate::bodies::{Bodies, BodyKind};
+use crate::constraints::kernels::types::ConstraintSet;
+use crate::contacts::Contact;
 use crate::disjoint::DisjointSets;
 use crate::narrowphase::Margins;
 use crate::params::{Budget, Parameters, Without};
@@ -169,7 +173,9 @@ impl Sleep {
         let pair = pair.map(|body| body as usize);
         let moved = pair.map(|i| bodies.is_dynamic(i) && self.still[i] < REST_TIME);
         for (i, other_moved) in pair.into_iter().zip([moved[1], moved[0]]) {
-            self.still[i] *= f32::from(u8::from(!other_moved));
+            if other_moved {
+                self.still[i] = 0.0;
+            }
         }
     }
 
@@ -208,9 +214,11 @@ impl Sleep {
 
     /// Lets all bodies be awake; returns whether some were asleep.
     fn clear(&mut self) -> bool {
-        let had = self.any();
-        *self = Sleep { edited: std::mem::take(&mut self.edited), ..Sleep::default() };
         self.edited.clear();
+        let had = self.any();
+        if !self.asleep.is_empty() {
+            *self = Sleep::default();
+        }
         had
     }
 
@@ -310,6 +318,12 @@ impl Sleep {
     }
 }
 
+/// The bodies of all contacts and of all constraints of other types.
+fn tied<'a>(contacts: &'a [Contact], types: &'a [ConstraintSet]) -> impl Iterator<Item = [u32; 2]> + 'a {
+    let joined = types.iter().flat_map(|joined| joined.kind.ends().iter().copied());
+    contacts.iter().map(|contact| [contact.body_a, contact.body_b]).chain(joined)
+}
+
 impl World {
     /// Whether a body sleeps, see [`Settings::sleep`](super::Settings::sleep).
     pub(super) fn is_asleep(&self, body: usize) -> bool {
@@ -356,9 +370,7 @@ impl World {
             sleep.seen.clone_from(bodies);
         }
         if any_drives {
-            let joined = work.types.iter().flat_map(|joined| joined.kind.ends().iter().copied());
-            let pairs = contacts.iter().map(|contact| [contact.body_a, contact.body_b]).chain(joined);
-            for [a, b] in pairs.map(|pair| pair.map(|body| body as usize)) {
+            for [a, b] in tied(contacts, &work.types).map(|pair| pair.map(|body| body as usize)) {
                 for (of, by) in [(a, b), (b, a)] {
                     if sleep.drives[by] {
                         sleep.disturb(of);
@@ -429,15 +441,13 @@ impl World {
         }
         let Sleep { asleep, island, still, islands, stays, held, state, fixed, seen, .. } = sleep;
         islands.begin(bodies.len());
-        let joined = work.types.iter().flat_map(|joined| joined.kind.ends().iter().copied());
-        let pairs = contacts.iter().map(|contact| [contact.body_a, contact.body_b]).chain(joined);
         let is_free = |body: u32| bodies.kind[body as usize] == BodyKind::Dynamic;
         held.clear();
         held.resize(bodies.len(), false);
         stays.clear();
         let each = still.iter().zip(&bodies.kind);
         stays.extend(each.map(|(&still, kind)| *kind != BodyKind::Dynamic || still < REST_TIME));
-        for [a, b] in pairs {
+        for [a, b] in tied(contacts, &work.types) {
             if is_free(a) && is_free(b) {
                 islands.join(a, b);
             } else {

@@ -58,10 +58,15 @@ impl Interval {
         Some(Interval { count, mean: share, ends })
     }
 
+    /// Half of its width; `None` for a single value.
+    pub fn half(&self) -> Option<f64> {
+        self.ends.map(|[low, high]| 0.5 * (high - low))
+    }
+
     /// `1.23 mm ± 0.1 mm` with this way to write a number.
     fn text(&self, show: impl Fn(f64) -> String) -> String {
-        match self.ends {
-            Some([low, high]) => format!("{} ± {}", show(self.mean), show(0.5 * (high - low))),
+        match self.half() {
+            Some(half) => format!("{} ± {}", show(self.mean), show(half)),
             None => show(self.mean),
         }
     }
