@@ -317,7 +317,7 @@ proptest! {
             let own = shape_body.iter().filter(|&&b| b as usize == body).count();
             fat_boxes.set(body, first, &shapes[first..first + own]);
         }
-        prop_assert_eq!(fat_boxes.update(&bodies, [0.01, 1.0], &mut proxies).len(), shapes.len());
+        prop_assert_eq!(fat_boxes.update(&bodies, [0.01, 1.0], &mut proxies, &Workers::default()).len(), shapes.len());
         for frame in moves.chunks(4) {
             for &(body, dx, dy, turn, scale) in frame {
                 let scale = 10f32.powi(scale);
@@ -328,7 +328,7 @@ proptest! {
                 bodies.velocity_x[body] = 100.0 * dx * scale;
             }
             let before = proxies.clone();
-            let moved = fat_boxes.update(&bodies, [0.01, 1.0], &mut proxies).to_vec();
+            let moved = fat_boxes.update(&bodies, [0.01, 1.0], &mut proxies, &Workers::default()).to_vec();
             prop_assert!(moved.is_sorted_by(|a, b| a < b));
             for (i, proxy) in proxies.iter().enumerate() {
                 let tight = bounds(&bodies, i);

@@ -36,11 +36,15 @@ use crate::bodies::{Bodies, BodyKind};
 use crate::lanes::LaneVec;
 use crate::params::{AABB_MARGIN, MAX_POLYGON_VERTICES, SPECULATIVE_DISTANCE};
 use crate::shapes::{Aabb, Pose, Shape};
+use crate::workers::Workers;
 use glam::Vec2;
 use wide::{f32x8, f32x16};
 
 /// Margin as a fraction of the larger side of a shape's bounds (1).
 const MARGIN_FRACTION: f32 = 0.1;
+
+/// Least number of bodies that are worth a thread.
+const LEAST_BODIES: usize = 256;
 
 /// Minimum number of steps that a margin must last; otherwise there is no margin (1).
 const LASTS: f32 = 2.0;
@@ -62,8 +66,77 @@ pub struct FatBoxes {
     first_shape: Vec<u32>,
     /// Bodies that fail the test.
     failed: Vec<u32>,
-    /// Shapes with a new fat box, ascending.
+    /// Shapes with a new fat box, as each thread found them, ascending from list to list.
+    found: Vec<Vec<u32>>,
+    /// All of them.
     moved: Vec<u32>,
+}
+
+/// What boxes are computed from.
+#[derive(Clone, Copy)]
+struct Sight<'a> {
+    bodies: &'a Bodies,
+    reach: &'a [f32],
+    outlines: &'a [CoreOutline],
+    first_shape: &'a [u32],
+    /// Time step (s) and length unit (m).
+    dt: f32,
+    unit: f32,
+}
+
+impl Sight<'_> {
+    /// First shape of a body, or of those after the last one.
+    fn first_shape(self, body: usize) -> usize {
+        self.first_shape.get(body).map_or(self.outlines.len(), |&first| first as usize)
+    }
+}
+
+/// Boxes and reference poses of consecutive bodies.
+struct Section<'a> {
+    /// First body and first shape.
+    body: usize,
+    shape: usize,
+    /// x, y, cos, sin, slack. `[bodies]`
+    columns: [&'a mut [f32]; 5],
+    /// `[shapes]`
+    proxies: &'a mut [Proxy],
+}
+
+impl Section<'_> {
+    /// Splits off what comes before a body.
+    fn split_off(&mut self, body: usize, shape: usize) -> Self {
+        let bodies = body - std::mem::replace(&mut self.body, body);
+        let shapes = shape - std::mem::replace(&mut self.shape, shape);
+        let columns =
+            self.columns.each_mut().map(|column| column.split_off_mut(..bodies).expect("as many bodies"));
+        let proxies = self.proxies.split_off_mut(..shapes).expect("as many shapes");
+        Section { body: body - bodies, shape: shape - shapes, columns, proxies }
+    }
+
+    /// Recomputes the boxes of one body if needed, and makes its pose the reference. Appends shapes with a new box.
+    fn look_at(&mut self, body: usize, sight: Sight<'_>, moved: &mut Vec<u32>) {
+        let Sight { bodies, reach, outlines, dt, unit, .. } = sight;
+        let pose = bodies.pose(body);
+        let (first, last) = (sight.first_shape(body), sight.first_shape(body + 1));
+        let speed = bodies.velocity(body).length();
+        let spin = bodies.angular_velocity[body].abs();
+        let [x, y, cos, sin, slack] = self.columns.each_mut().map(|column| &mut column[body - self.body]);
+        let mut least = f32::INFINITY;
+        for (i, proxy) in (first..last).zip(&mut self.proxies[first - self.shape..last - self.shape]) {
+            let tight = outlines[i].bounds(&pose).grown(unit * SPECULATIVE_DISTANCE);
+            if *slack < 0.0 || !proxy.aabb.contains(&tight) {
+                let extent = tight.max - tight.min;
+                let margin = (unit * AABB_MARGIN).min(MARGIN_FRACTION * extent.max_element());
+                let path = (speed + spin * reach[body]) * dt;
+                let lasts = path * LASTS <= margin && bodies.kind[body] != BodyKind::Static;
+                proxy.aabb = if lasts { tight.grown(margin) } else { tight };
+                moved.push(i as u32);
+            }
+            least = least.min(inset(&proxy.aabb, &tight));
+        }
+        (*slack, *x, *y) = (least, pose.position.x, pose.position.y);
+        (*cos, *sin) = (pose.rotation.x, pose.rotation.y);
+    }
 }
 
 impl FatBoxes {
@@ -103,14 +176,33 @@ impl FatBoxes {
     ///
     /// `dt` (s) is the time step over which velocities are assumed constant; `unit` is the length unit that
     /// lengths of the parameters are multiplied by.
-    pub fn update(&mut self, bodies: &Bodies, [dt, unit]: [f32; 2], proxies: &mut [Proxy]) -> &[u32] {
-        self.moved.clear();
-        self.moved.reserve(self.outlines.len());
+    pub fn update(
+        &mut self,
+        bodies: &Bodies,
+        [dt, unit]: [f32; 2],
+        proxies: &mut [Proxy],
+        workers: &Workers,
+    ) -> &[u32] {
         self.find_failed(bodies);
-        for i in 0..self.failed.len() {
-            self.look_at(self.failed[i] as usize, bodies, [dt, unit], proxies);
-        }
-        &self.moved
+        let FatBoxes { x, y, cos, sin, reach, slack, outlines, first_shape, failed, found, moved } = self;
+        let sight = Sight { bodies, reach, outlines, first_shape, dt, unit };
+        let size = workers.part(failed.len(), LEAST_BODIES);
+        let count = failed.len().div_ceil(size);
+        found.resize_with(count.max(found.len()), Vec::new);
+        let columns = [x, y, cos, sin, slack].map(|column| &mut **column);
+        let mut rest = Section { body: 0, shape: 0, columns, proxies };
+        let parts = failed.chunks(size).zip(&mut *found).map(|(failed, found)| {
+            let end = failed.last().map_or(0, |&body| body as usize + 1);
+            (failed, rest.split_off(end, sight.first_shape(end)), found)
+        });
+        workers.each(parts, |(failed, mut section, found)| {
+            found.clear();
+            failed.iter().for_each(|&body| section.look_at(body as usize, sight, found));
+        });
+        moved.clear();
+        moved.reserve(outlines.len());
+        found[..count].iter().for_each(|found| moved.extend_from_slice(found));
+        moved
     }
 
     /// Lists the bodies for which (1) exceeds the slack or is NaN.
@@ -142,31 +234,6 @@ impl FatBoxes {
                 }
             }
         }
-    }
-
-    /// Recomputes the boxes of one body if needed, and makes its pose the reference.
-    fn look_at(&mut self, body: usize, bodies: &Bodies, [dt, unit]: [f32; 2], proxies: &mut [Proxy]) {
-        let pose = bodies.pose(body);
-        let first = self.first_shape[body] as usize;
-        let last = self.first_shape.get(body + 1).map_or(self.outlines.len(), |&next| next as usize);
-        let speed = bodies.velocity(body).length();
-        let spin = bodies.angular_velocity[body].abs();
-        let mut slack = f32::INFINITY;
-        for (i, proxy) in (first..last).zip(&mut proxies[first..last]) {
-            let tight = self.outlines[i].bounds(&pose).grown(unit * SPECULATIVE_DISTANCE);
-            if self.slack[body] < 0.0 || !proxy.aabb.contains(&tight) {
-                let extent = tight.max - tight.min;
-                let margin = (unit * AABB_MARGIN).min(MARGIN_FRACTION * extent.max_element());
-                let path = (speed + spin * self.reach[body]) * dt;
-                let lasts = path * LASTS <= margin && bodies.kind[body] != BodyKind::Static;
-                proxy.aabb = if lasts { tight.grown(margin) } else { tight };
-                self.moved.push(i as u32);
-            }
-            slack = slack.min(inset(&proxy.aabb, &tight));
-        }
-        self.slack[body] = slack;
-        (self.x[body], self.y[body]) = (pose.position.x, pose.position.y);
-        (self.cos[body], self.sin[body]) = (pose.rotation.x, pose.rotation.y);
     }
 }
 

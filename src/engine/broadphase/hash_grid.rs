@@ -22,7 +22,8 @@
 //! (`teschner2003`); a grid per size class, Mirtich 1996 (`mirtich1996`).
 
 use super::Proxy;
-use super::sort::PairSort;
+use super::sort::{ByLower, merge};
+use crate::workers::Workers;
 use glam::Vec2;
 
 /// Buckets per proxy of a level. More buckets mean fewer collisions but a longer prefix sum.
@@ -46,7 +47,7 @@ pub struct HashGrid {
     entries: Vec<GridEntry>,
     /// Pairs in the order found.
     found: Vec<[u32; 2]>,
-    sort: PairSort,
+    sorted: ByLower,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -99,13 +100,14 @@ fn size_class(proxy: &Proxy) -> u8 {
 
 impl HashGrid {
     /// See [`super::BroadPhase::pairs`].
-    pub fn pairs(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>) {
+    pub fn pairs(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>, workers: &Workers) {
         self.fill(proxies);
         self.found.clear();
         for position in 0..self.entries.len() {
             self.search(position);
         }
-        self.sort.sort(proxies.len(), &self.found, out);
+        self.sorted.sort(proxies.len(), &self.found);
+        merge(proxies.len(), std::iter::once(&self.sorted), out, workers);
     }
 
     /// Counting sort of the proxies by bucket.

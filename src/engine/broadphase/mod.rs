@@ -104,7 +104,7 @@ impl BroadPhase {
     /// removed at the end.
     pub fn pairs(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>, workers: &Workers) {
         match self {
-            BroadPhase::HashGrid(grid) => grid.pairs(proxies, out),
+            BroadPhase::HashGrid(grid) => grid.pairs(proxies, out, workers),
             BroadPhase::Tree(tree) => tree.pairs(proxies, out, workers),
             BroadPhase::Spaces(spaces) => spaces.pairs(proxies, out),
         }

@@ -1,5 +1,7 @@
 //! Sorts pairs found in any order.
 
+use crate::workers::Workers;
+use std::ops::Range;
 use wide::u32x16;
 
 /// Most partners that are sorted in lanes.
@@ -8,17 +10,20 @@ const LANES: usize = 16;
 /// Most partners that are sorted by insertion.
 const FEW: usize = 4;
 
-/// Sorts pairs of proxies, each with the lower index first. Buffers are reused.
+/// Least number of proxies that are worth a thread.
+const LEAST_PROXIES: usize = 1024;
+
+/// Pairs of proxies, each with the lower index first, in the order of that index. Buffers are reused.
 #[derive(Clone, Debug, Default)]
-pub(super) struct PairSort {
-    /// First pair of each proxy in the sorted list, `[proxies + 2]`.
+pub(super) struct ByLower {
+    /// First pair of each proxy, `[proxies + 2]`.
     first: Vec<u32>,
+    pairs: Vec<[u32; 2]>,
 }
 
-impl PairSort {
-    /// Sorts `found` into `out`: a counting sort by the lower index, then a sort of each proxy's few
-    /// partners.
-    pub fn sort(&mut self, proxies: usize, found: &[[u32; 2]], out: &mut Vec<[u32; 2]>) {
+impl ByLower {
+    /// Sorts `found` by the lower index: a counting sort.
+    pub fn sort(&mut self, proxies: usize, found: &[[u32; 2]]) {
         self.first.clear();
         self.first.resize(proxies + 2, 0);
         for pair in found {
@@ -29,16 +34,49 @@ impl PairSort {
             sum += *first;
             *first = sum;
         }
-        out.resize(found.len(), [0; 2]);
+        self.pairs.resize(found.len(), [0; 2]);
         for &pair in found {
             let next = &mut self.first[pair[0] as usize + 1];
-            out[*next as usize] = pair;
+            self.pairs[*next as usize] = pair;
             *next += 1;
         }
-        for range in self.first[..=proxies].windows(2) {
-            sort_partners(&mut out[range[0] as usize..range[1] as usize]);
-        }
     }
+
+    /// Number of pairs of the proxies before `proxy`.
+    fn before(&self, proxy: usize) -> usize {
+        self.first[proxy] as usize
+    }
+
+    /// Pairs whose lower proxy is in this range.
+    fn of(&self, proxies: Range<usize>) -> &[[u32; 2]] {
+        &self.pairs[self.before(proxies.start)..self.before(proxies.end)]
+    }
+}
+
+/// Merges lists that share no pair into `out`, in ascending order.
+pub(super) fn merge<'a, L>(proxies: usize, lists: L, out: &mut Vec<[u32; 2]>, workers: &Workers)
+where
+    L: Iterator<Item = &'a ByLower> + Clone + Sync,
+{
+    let before = |proxy: usize| lists.clone().map(|list| list.before(proxy)).sum::<usize>();
+    out.resize(before(proxies), [0; 2]);
+    let size = workers.part(proxies, LEAST_PROXIES);
+    let mut rest = &mut out[..];
+    let parts = (0..proxies).step_by(size).map(|first| {
+        let part = first..(first + size).min(proxies);
+        let len = before(part.end) - before(part.start);
+        (part, rest.split_off_mut(..len).expect("room for all pairs"))
+    });
+    workers.each(parts, |(part, mut out)| {
+        for proxy in part {
+            let mut len = 0;
+            for partners in lists.clone().map(|list| list.of(proxy..proxy + 1)) {
+                out[len..len + partners.len()].copy_from_slice(partners);
+                len += partners.len();
+            }
+            sort_partners(out.split_off_mut(..len).expect("room for all pairs"));
+        }
+    });
 }
 
 /// Sorts the partners of one proxy: the position of each is the number of lower ones. Without data-dependent

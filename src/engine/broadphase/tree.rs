@@ -25,7 +25,7 @@
 use super::Proxy;
 use super::curve::{BITS, hilbert};
 use super::node::{BITS_OF_FAN, FAN, Node};
-use super::sort::PairSort;
+use super::sort::{ByLower, merge};
 use crate::workers::Workers;
 use std::ops::Range;
 use wide::f32x16;
@@ -55,7 +55,6 @@ pub struct Tree {
     keys: Vec<u64>,
     /// Whether a proxy moved in this call, `[proxies]`.
     moved: Vec<bool>,
-    sort: PairSort,
     merged: Vec<[u32; 2]>,
     /// The search of each thread.
     searches: Vec<Search>,
@@ -67,6 +66,7 @@ struct Search {
     /// Pairs in the order found; the first `len` are in use.
     found: Vec<[u32; 2]>,
     len: usize,
+    sorted: ByLower,
     /// Stack of levels and nodes to visit.
     stack: Vec<[u32; 2]>,
 }
@@ -75,10 +75,10 @@ impl Tree {
     /// See [`super::BroadPhase::pairs`].
     pub fn pairs(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>, workers: &Workers) {
         if !self.has_order(proxies) {
-            self.make_order(proxies);
+            self.make_order(proxies, workers);
         } else {
-            self.fill(proxies);
-            self.renew_order(proxies);
+            self.fill(proxies, workers);
+            self.renew_order(proxies, workers);
         }
         self.find_all(proxies, out, workers);
     }
@@ -101,7 +101,7 @@ impl Tree {
             }
         }
         self.refit(2);
-        self.renew_order(proxies);
+        self.renew_order(proxies, workers);
         self.find_moved(proxies, moved, pairs, workers);
     }
 
@@ -111,7 +111,7 @@ impl Tree {
     }
 
     /// Sorts the proxies along the curve and builds the levels.
-    fn make_order(&mut self, proxies: &[Proxy]) {
+    fn make_order(&mut self, proxies: &[Proxy], workers: &Workers) {
         self.keys.clear();
         self.keys.reserve(proxies.len());
         let exponent = |p: &Proxy| {
@@ -162,14 +162,14 @@ impl Tree {
             }
             count = count.div_ceil(FAN);
         }
-        self.fill(proxies);
+        self.fill(proxies, workers);
         self.cost_of_order = self.cost();
     }
 
     /// Rebuilds the order if the rebuild threshold is exceeded.
-    fn renew_order(&mut self, proxies: &[Proxy]) {
+    fn renew_order(&mut self, proxies: &[Proxy], workers: &Workers) {
         if self.cost() > REBUILD_THRESHOLD * self.cost_of_order {
-            self.make_order(proxies);
+            self.make_order(proxies, workers);
         }
     }
 
@@ -186,29 +186,31 @@ impl Tree {
     }
 
     /// Sets all boxes.
-    fn fill(&mut self, proxies: &[Proxy]) {
-        for (node, order) in self.levels[0].iter_mut().zip(self.order.chunks(FAN)) {
-            for (lane, &i) in order.iter().enumerate() {
-                node.set(lane, sides(&proxies[i as usize]));
+    fn fill(&mut self, proxies: &[Proxy], workers: &Workers) {
+        let (leaves, above) = self.levels.split_at_mut(1);
+        // Whole nodes of the next level.
+        let size = workers.part(leaves[0].len(), LEAST_LEAVES);
+        let mut parents = above.first_mut().map_or(&mut [][..], |level| level).chunks_mut(size / FAN);
+        let parts = leaves[0].chunks_mut(size).zip(self.order[..proxies.len()].chunks(size * FAN));
+        let parts = parts.map(|(leaves, order)| (leaves, order, parents.next().unwrap_or_default()));
+        workers.each(parts, |(leaves, order, parents)| {
+            for (node, order) in leaves.iter_mut().zip(order.chunks(FAN)) {
+                for (lane, &i) in order.iter().enumerate() {
+                    node.set(lane, sides(&proxies[i as usize]));
+                }
+                // Places past the last proxy are empty.
+                (order.len()..FAN).for_each(|lane| node.set(lane, [f32::NAN; 4]));
             }
-        }
-        // Places past the last proxy are empty.
-        if let Some(node) = self.levels[0].last_mut() {
-            let used = self.place.len() - (self.place.len().div_ceil(FAN).max(1) - 1) * FAN;
-            for lane in used..FAN {
-                node.set(lane, [f32::NAN; 4]);
-            }
-        }
-        self.refit(1);
+            refit(leaves, parents);
+        });
+        self.refit(2);
     }
 
     /// Refits the boxes of the levels from `first` on.
     fn refit(&mut self, first: usize) {
         for level in first..self.levels.len() {
             let (below, above) = self.levels.split_at_mut(level);
-            for (i, node) in below[level - 1].iter().enumerate() {
-                above[0][i / FAN].set(i % FAN, node.bounds());
-            }
+            refit(&below[level - 1], &mut above[0]);
         }
     }
 
@@ -221,21 +223,15 @@ impl Tree {
         searches.resize_with(count.max(searches.len()), Search::default);
         workers.each(searches[..count].iter_mut().enumerate(), |(part, search)| {
             self.find_of(part * size..((part + 1) * size).min(leaves), proxies, search);
+            search.sorted.sort(proxies.len(), &search.found[..search.len]);
         });
-        let (first, rest) = searches[..count].split_at_mut(1);
-        for search in rest {
-            let Search { found, len, .. } = &mut first[0];
-            found.truncate(*len);
-            found.extend_from_slice(&search.found[..search.len]);
-            *len = found.len();
-        }
-        self.sort.sort(proxies.len(), &first[0].found[..first[0].len], out);
+        merge(proxies.len(), searches[..count].iter().map(|search| &search.sorted), out, workers);
         self.searches = searches;
     }
 
     /// Finds the pairs of some leaves.
     fn find_of(&self, leaves: Range<usize>, proxies: &[Proxy], search: &mut Search) {
-        let Search { found, len, stack } = search;
+        let Search { found, len, stack, .. } = search;
         *len = 0;
         for i in leaves {
             let leaf = &self.levels[0][i];
@@ -358,6 +354,13 @@ impl Tree {
                 visit(places, hits);
             }
         }
+    }
+}
+
+/// Sets the boxes of nodes to the bounds of their children; of none if there are no nodes.
+fn refit(children: &[Node], nodes: &mut [Node]) {
+    for (node, children) in nodes.iter_mut().zip(children.chunks(FAN)) {
+        children.iter().enumerate().for_each(|(i, child)| node.set(i, child.bounds()));
     }
 }
 

@@ -151,11 +151,14 @@ pub struct Jobs {
     pub shapes: [Vec<u32>; 2],
     /// The contact that stores the manifold, or [`NO_CONTACT`].
     pub contact: Vec<u32>,
+    /// Number of jobs that each thread listed, for reuse.
+    kept: Vec<usize>,
     /// What each thread found, for reuse.
     results: Vec<PartResult>,
 }
 
-/// Least number of pairs that are worth a thread.
+/// Least number of pairs to list, and to collide, that are worth a thread.
+const LEAST_LISTED: usize = 1024;
 const LEAST_PART: usize = 256;
 
 /// Index of a pair without a contact.
@@ -166,28 +169,46 @@ impl Jobs {
     /// bodies, shapes and contact.
     ///
     /// Every pair is written after the last kept one, whether kept or not, which avoids a branch.
-    #[inline(always)]
-    pub fn list(&mut self, pairs: &[u32], mut job: impl FnMut(u32) -> (bool, [u32; 2], [u32; 2], u32)) {
-        let Jobs { name, bodies: [a, b], shapes: [c, d], contact, .. } = self;
+    pub fn list(
+        &mut self,
+        pairs: &[u32],
+        workers: &Workers,
+        job: impl Fn(u32) -> (bool, [u32; 2], [u32; 2], u32) + Sync,
+    ) {
+        let Jobs { name, bodies: [a, b], shapes: [c, d], contact, kept, .. } = self;
         let mut lists = [name, a, b, c, d, contact];
-        let mut kept = 0;
-        {
-            let [name, a, b, c, d, contact] = lists.each_mut().map(|list| {
-                list.resize(pairs.len(), 0);
-                &mut list[..pairs.len()]
-            });
+        let size = workers.part(pairs.len(), LEAST_LISTED);
+        kept.resize(pairs.len().div_ceil(size), 0);
+        let mut chunks = lists.each_mut().map(|list| {
+            list.resize(pairs.len(), 0);
+            list.chunks_mut(size)
+        });
+        let parts = pairs.chunks(size).zip(&mut *kept);
+        let parts =
+            parts.map(|part| (part, chunks.each_mut().map(|chunks| chunks.next().unwrap_or_default())));
+        workers.each(parts, |((pairs, kept), lists)| {
+            let [name, a, b, c, d, contact] = lists.map(|list| &mut list[..pairs.len()]);
+            let mut next = 0;
             for &pair in pairs {
                 let (keep, bodies, shapes, of_pair) = job(pair);
-                name[kept] = pair;
-                [a[kept], b[kept]] = bodies;
-                [c[kept], d[kept]] = shapes;
-                contact[kept] = of_pair;
-                kept += usize::from(keep);
+                name[next] = pair;
+                [a[next], b[next]] = bodies;
+                [c[next], d[next]] = shapes;
+                contact[next] = of_pair;
+                next += usize::from(keep);
             }
+            *kept = next;
+        });
+        // The parts move together.
+        let mut end = 0;
+        for (part, &kept) in kept.iter().enumerate() {
+            let first = part * size;
+            if first > end {
+                lists.iter_mut().for_each(|list| list.copy_within(first..first + kept, end));
+            }
+            end += kept;
         }
-        for list in lists {
-            list.truncate(kept);
-        }
+        lists.into_iter().for_each(|list| list.truncate(end));
     }
 }
 
@@ -232,7 +253,7 @@ pub fn update(
     found: &mut Vec<Found>,
     change: &mut Change,
 ) -> usize {
-    let Jobs { name, bodies, shapes, contact, results } = jobs;
+    let Jobs { name, bodies, shapes, contact, results, .. } = jobs;
     let count = name.len();
     let below = |list, limit: usize, what: &str| {
         let list = IndexList::new(list);

@@ -22,6 +22,17 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// Room for a candidate.
+    pub const NONE: Candidate = Candidate {
+        shapes: [0; 2],
+        bodies: [0; 2],
+        numbers: [0; 2],
+        reach_squared: 0.0,
+        friction: 0.0,
+        restitution: 0.0,
+        contact: super::batch::NO_CONTACT,
+    };
+
     /// The shape pair as a sortable number.
     pub fn pair(&self) -> u64 {
         pair_key(self.shapes[0], self.shapes[1])

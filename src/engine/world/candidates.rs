@@ -1,6 +1,7 @@
 //! Candidates: pairs of shapes whose bounds overlap, kept while they do.
 
 use super::World;
+use super::collide::Narrow;
 use super::joints::JointSlots;
 use crate::bodies::{BodyKind, Filter};
 use crate::contacts::pair_key;
@@ -23,45 +24,85 @@ pub(super) fn reach_squared(reach: [f32; 2], length_unit: f32) -> f32 {
     reach * reach * REACH_ROUNDING
 }
 
+/// Least number of pairs that are worth a thread.
+const LEAST_PAIRS: usize = 1024;
+
+/// What one thread found among the pairs of a part.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Listed {
+    /// Number of candidates, and of those with a contact.
+    count: usize,
+    touching: usize,
+    /// Their indices by [`PairKind`], as if no pair was left out before the part.
+    of_kind: [Vec<u32>; PairKind::ALL.len()],
+}
+
 impl World {
     /// Rebuilds the candidates from `self.pairs`; persisting ones keep their contact.
     ///
-    /// Both lists are sorted by shape pair, so one walk along both is enough.
+    /// Both lists are sorted by shape pair, so one walk along both is enough. Each thread walks along a part.
     pub(super) fn update_candidates(&mut self) {
-        let narrow = &mut self.narrow;
-        std::mem::swap(&mut narrow.candidates, &mut narrow.last_candidates);
-        narrow.candidates.clear();
-        narrow.of_kind.iter_mut().for_each(Vec::clear);
-        let mut last = narrow.last_candidates.iter().peekable();
-        let mut kept = 0;
-        let may_ignore = !self.filters.is_empty() || self.joints.keeps_any_apart();
-        for &[i, j] in &self.pairs {
-            let (a, b) = if self.proxies[j as usize].dynamic { (i, j) } else { (j, i) };
-            let [sa, sb] = [a, b].map(|shape| &self.surfaces[shape as usize]);
-            let bodies = [a, b].map(|shape| self.shape_body[shape as usize]);
-            // Two segments never touch.
-            let Some(kind) = PairKind::of(sa.class, sb.class) else { continue };
-            if may_ignore && ignores(&self.joints, &self.filters, [a, b], bodies) {
-                continue;
+        let World { narrow, pairs, work, .. } = self;
+        let Narrow { candidates, last_candidates, listed, of_kind, .. } = narrow;
+        std::mem::swap(candidates, last_candidates);
+        candidates.resize(pairs.len(), Candidate::NONE);
+        let size = work.workers.part(pairs.len(), LEAST_PAIRS);
+        let count = pairs.len().div_ceil(size);
+        listed.resize_with(count.max(listed.len()), Listed::default);
+        let (proxies, surfaces, shape_body) = (&self.proxies, &self.surfaces, &self.shape_body);
+        let (joints, filters, unit) = (&self.joints, &self.filters, self.settings.length_unit);
+        let may_ignore = !filters.is_empty() || joints.keeps_any_apart();
+        let parts = pairs.chunks(size).zip(candidates.chunks_mut(size)).zip(&mut *listed);
+        work.workers.each((0..).step_by(size).zip(parts), |(first, ((pairs, candidates), listed))| {
+            let Listed { count, touching, of_kind } = listed;
+            (*count, *touching) = (0, 0);
+            of_kind.iter_mut().for_each(Vec::clear);
+            let start = pairs.first().map_or(0, |&[i, j]| pair_key(i, j));
+            let start = last_candidates.partition_point(|old| old.pair() < start);
+            let mut last = last_candidates[start..].iter().peekable();
+            for &[i, j] in pairs {
+                let (a, b) = if proxies[j as usize].dynamic { (i, j) } else { (j, i) };
+                let [sa, sb] = [a, b].map(|shape| &surfaces[shape as usize]);
+                let bodies = [a, b].map(|shape| shape_body[shape as usize]);
+                // Two segments never touch.
+                let Some(kind) = PairKind::of(sa.class, sb.class) else { continue };
+                if may_ignore && ignores(joints, filters, [a, b], bodies) {
+                    continue;
+                }
+                let key = pair_key(i, j);
+                while last.next_if(|old| old.pair() < key).is_some() {}
+                let candidate = match last.next_if(|old| old.pair() == key) {
+                    Some(old) => *old,
+                    None => Candidate {
+                        shapes: [a, b],
+                        bodies,
+                        numbers: [sa.number, sb.number],
+                        reach_squared: reach_squared([sa.reach, sb.reach], unit),
+                        friction: (sa.friction * sb.friction).sqrt(),
+                        restitution: sa.restitution.max(sb.restitution),
+                        contact: NO_CONTACT,
+                    },
+                };
+                *touching += usize::from(candidate.touches());
+                of_kind[kind as usize].push((first + *count) as u32);
+                candidates[*count] = candidate;
+                *count += 1;
             }
-            let key = pair_key(i, j);
-            while last.next_if(|old| old.pair() < key).is_some() {}
-            let candidate = match last.next_if(|old| old.pair() == key) {
-                Some(old) => *old,
-                None => Candidate {
-                    shapes: [a, b],
-                    bodies,
-                    numbers: [sa.number, sb.number],
-                    reach_squared: reach_squared([sa.reach, sb.reach], self.settings.length_unit),
-                    friction: (sa.friction * sb.friction).sqrt(),
-                    restitution: sa.restitution.max(sb.restitution),
-                    contact: NO_CONTACT,
-                },
-            };
-            kept += usize::from(candidate.touches());
-            narrow.of_kind[kind as usize].push(narrow.candidates.len() as u32);
-            narrow.candidates.push(candidate);
+        });
+        of_kind.iter_mut().for_each(Vec::clear);
+        let (mut end, mut touching) = (0, 0);
+        for (first, listed) in (0..).step_by(size).zip(&listed[..count]) {
+            let left_out = first - end;
+            if left_out > 0 {
+                candidates.copy_within(first..first + listed.count, end);
+            }
+            for (all, part) in of_kind.iter_mut().zip(&listed.of_kind) {
+                all.extend(part.iter().map(|name| name - left_out as u32));
+            }
+            end += listed.count;
+            touching += listed.touching;
         }
+        candidates.truncate(end);
         narrow.on_seams.clear();
         if !self.seams.is_empty() {
             let has_seams = |(_, candidate): &(u32, &Candidate)| self.seams.has(candidate.shapes[0]);
@@ -77,6 +118,6 @@ impl World {
         }
         narrow.jobs_are_current = false;
         // A contact is removed together with its candidate.
-        narrow.is_changed |= kept != self.contacts.len();
+        narrow.is_changed |= touching != self.contacts.len();
     }
 }

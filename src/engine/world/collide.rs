@@ -1,6 +1,7 @@
 //! Updates contacts from candidates and carries their impulses from step to step.
 
 use super::World;
+use super::candidates::Listed;
 use super::sleep::Sleep;
 use crate::constraints::Solver;
 use crate::constraints::step::{Collision, CollisionScene};
@@ -12,6 +13,7 @@ use crate::narrowphase::candidate::Candidate;
 use crate::narrowphase::circles::Rolling;
 use crate::narrowphase::frozen::Found;
 use crate::narrowphase::lanes::PoseRow;
+use crate::workers::Workers;
 use std::ops::Range;
 
 /// State of the narrow phase between steps.
@@ -20,6 +22,8 @@ pub(super) struct Narrow {
     /// Candidates, sorted by shape pair.
     pub candidates: Vec<Candidate>,
     pub last_candidates: Vec<Candidate>,
+    /// The candidates of each thread, for reuse.
+    pub listed: Vec<Listed>,
     /// Candidates of shapes with seams.
     pub on_seams: Vec<u32>,
     /// Candidates by [`PairKind`].
@@ -39,6 +43,8 @@ pub(super) struct Narrow {
     jobs: [Jobs; PairKind::ALL.len()],
     /// New contacts, in the order in which they were found, and the poses at which they were.
     fresh: Vec<(Contact, Option<Found>)>,
+    /// Number of contacts of each thread's candidates, for reuse.
+    touching: Vec<usize>,
     last_contacts: Vec<Contact>,
     last_found: Vec<Found>,
     /// Number of contacts after the last update.
@@ -49,8 +55,9 @@ pub(super) struct Narrow {
 /// ahead.
 const AHEAD: f32 = 1.25;
 
-/// Least number of bodies that are worth a thread.
+/// Least number of bodies, and of candidates, that are worth a thread.
 const LEAST_BODIES: usize = 512;
+const LEAST_CANDIDATES: usize = 1024;
 
 /// `Candidate::contact` of a pair that has just begun to touch: this bit and the index in `fresh`.
 const FRESH: u32 = 1 << 31;
@@ -114,7 +121,8 @@ impl World {
         let mut points = 0;
         // An island that something touches wakes, and may touch others.
         loop {
-            self.narrow.list_jobs(self.contacts.len(), is_partial.then_some(&self.sleep));
+            let sleep = is_partial.then_some(&self.sleep);
+            self.narrow.list_jobs(self.contacts.len(), sleep, &self.work.workers);
             self.sleep.note_listed();
             points += self.collide(rolling);
             if !is_partial || !self.wake_touched() {
@@ -125,7 +133,7 @@ impl World {
         let narrow = &mut self.narrow;
         if narrow.is_changed {
             self.sleep.note_change();
-            narrow.sort_contacts(&mut self.contacts);
+            narrow.sort_contacts(&mut self.contacts, &self.work.workers);
         }
         narrow.count = self.contacts.len();
         let kept = &mut self.work.kept;
@@ -275,7 +283,7 @@ impl Narrow {
             candidate.contact = found.map_or(NO_CONTACT, |(i, _)| i as u32);
         }
         std::mem::swap(contacts, &mut self.last_contacts);
-        self.sort_contacts(contacts);
+        self.sort_contacts(contacts, &Workers::default());
         (self.is_changed, self.count) = (true, contacts.len());
     }
 
@@ -283,14 +291,14 @@ impl Narrow {
     ///
     /// While some bodies sleep, only pairs that `sleep` lists. If most candidates do not touch, those whose centers are
     /// too far apart are skipped before their shapes are read. If most touch, the lists of the last step are reused.
-    fn list_jobs(&mut self, contacts: usize, sleep: Option<&Sleep>) {
+    fn list_jobs(&mut self, contacts: usize, sleep: Option<&Sleep>, workers: &Workers) {
         let cull = 4 * contacts < 3 * self.candidates.len();
         if self.jobs_are_current && !cull {
             return;
         }
         self.jobs_are_current = !cull && sleep.is_none();
         for (jobs, names) in self.jobs.iter_mut().zip(&self.of_kind) {
-            jobs.list(names, |name| {
+            jobs.list(names, workers, |name| {
                 let candidate = &self.candidates[name as usize];
                 let [a, b] = candidate.bodies.map(|body| self.poses[body as usize].position);
                 let d = [(b[0] - a[0]) + (b[2] - a[2]), (b[1] - a[1]) + (b[3] - a[3])];
@@ -302,25 +310,42 @@ impl Narrow {
         }
     }
 
-    /// Puts contacts in the order of their candidates, persisting and fresh ones together.
-    fn sort_contacts(&mut self, contacts: &mut Vec<Contact>) {
+    /// Puts contacts in the order of their candidates, persisting and fresh ones together. Each thread fills a part.
+    fn sort_contacts(&mut self, contacts: &mut Vec<Contact>, workers: &Workers) {
         std::mem::swap(contacts, &mut self.last_contacts);
         std::mem::swap(&mut self.found, &mut self.last_found);
-        contacts.clear();
-        self.found.clear();
-        for candidate in &mut self.candidates {
-            if !candidate.touches() {
-                continue;
+        let Narrow { candidates, touching, fresh, last_contacts, found, last_found, .. } = self;
+        let size = workers.part(candidates.len(), LEAST_CANDIDATES);
+        touching.resize(candidates.len().div_ceil(size), 0);
+        workers.each(candidates.chunks(size).zip(&mut *touching), |(candidates, touching)| {
+            *touching = candidates.iter().filter(|candidate| candidate.touches()).count();
+        });
+        let count = touching.iter().sum();
+        contacts.resize(count, Contact::default());
+        let has_found = !last_found.is_empty() || fresh.first().is_some_and(|(_, found)| found.is_some());
+        found.resize(if has_found { count } else { 0 }, Found::NEVER);
+        let (mut first, mut rest) = (0, (&mut contacts[..], &mut found[..]));
+        let parts = candidates.chunks_mut(size).zip(&*touching).map(|(candidates, &count)| {
+            let contacts = rest.0.split_off_mut(..count).expect("room for all contacts");
+            let found = rest.1.split_off_mut(..count).unwrap_or_default();
+            first += count;
+            (candidates, first - count, contacts, found)
+        });
+        workers.each(parts, |(candidates, first, contacts, found)| {
+            let touching = candidates.iter_mut().filter(|candidate| candidate.touches());
+            for (i, (candidate, contact)) in touching.zip(contacts).enumerate() {
+                let from = (candidate.contact & !FRESH) as usize;
+                let was_found;
+                (*contact, was_found) = match candidate.contact & FRESH {
+                    0 => (last_contacts[from], last_found.get(from).copied()),
+                    _ => fresh[from],
+                };
+                candidate.contact = (first + i) as u32;
+                if let (Some(found), Some(was)) = (found.get_mut(i), was_found) {
+                    *found = was;
+                }
             }
-            let from = (candidate.contact & !FRESH) as usize;
-            let (contact, found) = match candidate.contact & FRESH {
-                0 => (self.last_contacts[from], self.last_found.get(from).copied()),
-                _ => self.fresh[from],
-            };
-            candidate.contact = contacts.len() as u32;
-            contacts.push(contact);
-            self.found.extend(found);
-        }
+        });
         self.jobs_are_current = false;
     }
 }

@@ -11,7 +11,8 @@ impl World {
     pub(super) fn update_pairs(&mut self) {
         self.follow_settings();
         let World { bodies, proxies, pairs, settings, work, .. } = self;
-        let moved = self.fat_boxes.update(bodies, [settings.dt, settings.length_unit], proxies);
+        let moved =
+            self.fat_boxes.update(bodies, [settings.dt, settings.length_unit], proxies, &work.workers);
         let is_ground = |&shape: &u32| bodies.kind[proxies[shape as usize].body as usize] == BodyKind::Static;
         self.seams_are_stale |= moved.iter().any(is_ground);
         if self.pairs_are_stale {
