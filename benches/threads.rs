@@ -7,8 +7,9 @@
 //! cargo bench --bench threads -- 2 many_pyramids:32 groups=1024 # contacts in a group
 //! ```
 //!
-//! The bits of all runs must be the same at the end.
+//! The bits of all runs must be the same at the end. Below each run: its phases, in groups with one thread and with more.
 
+use simpulse::engine::clock::Phase;
 use simpulse::engine::solvers::{self, Variant};
 use simpulse::engine::world::{Settings, World};
 use simpulse::lab::scenes;
@@ -55,10 +56,12 @@ fn main() {
 fn compare(name: &str, variant: &'static Variant, [threads, group_size]: [usize; 2], steps: u32) {
     let scene = scenes::load(name).expect("a scene of the catalog").scene;
     let world = |threads, group_size| {
-        scene.build(Settings { threads, group_size, ..Settings::new(variant) }).expect("a valid scene")
+        let settings = Settings { threads, group_size, timed: true, ..Settings::new(variant) };
+        scene.build(settings).expect("a valid scene")
     };
     let mut worlds: [World; 3] = [world(1, 0), world(1, group_size), world(threads, group_size)];
     let (mut sums, mut longest) = ([Duration::ZERO; 3], [Duration::ZERO; 3]);
+    let mut phases = [[Duration::ZERO; Phase::ALL.len()]; 3];
     for first in (0..steps).step_by(TURN as usize) {
         for (i, world) in worlds.iter_mut().enumerate() {
             for _ in first..(first + TURN).min(steps) {
@@ -66,6 +69,9 @@ fn compare(name: &str, variant: &'static Variant, [threads, group_size]: [usize;
                 world.step().expect("a scene that holds");
                 let time = begun.elapsed();
                 (sums[i], longest[i]) = (sums[i] + time, longest[i].max(time));
+                for (sum, &ns) in phases[i].iter_mut().zip(&world.timings().phase_ns) {
+                    *sum += Duration::from_nanos(ns);
+                }
             }
         }
     }
@@ -77,4 +83,10 @@ fn compare(name: &str, variant: &'static Variant, [threads, group_size]: [usize;
         "{name} {}: {whole:.2?}, {one:.2?} ({groups:.2} times), {more:.2?} ({gain:.2} times); longest {longest:.2?}",
         variant.name
     );
+    for (k, phase) in Phase::ALL.into_iter().enumerate() {
+        let [one, more] = [phases[1][k], phases[2][k]].map(|sum| sum / steps);
+        if 50 * one > sums[1] / steps {
+            println!("    {:<12} {one:>9.1?} {more:>9.1?}", phase.name());
+        }
+    }
 }
