@@ -44,6 +44,11 @@ pub struct Workers {
     rests: bool,
 }
 
+/// What one thread writes, in cache lines of its own: two, because they are fetched in pairs.
+#[derive(Clone, Debug, Default)]
+#[repr(align(128))]
+pub struct Apart<T>(pub T);
+
 /// What the threads run; it gets the number of the thread.
 type Task<'a> = dyn Fn(usize) + Sync + 'a;
 

@@ -36,7 +36,7 @@ use crate::bodies::{Bodies, BodyKind};
 use crate::lanes::LaneVec;
 use crate::params::{AABB_MARGIN, MAX_POLYGON_VERTICES, SPECULATIVE_DISTANCE};
 use crate::shapes::{Aabb, Pose, Shape};
-use crate::workers::Workers;
+use crate::workers::{Apart, Workers};
 use glam::Vec2;
 use wide::{f32x8, f32x16};
 
@@ -67,7 +67,7 @@ pub struct FatBoxes {
     /// Bodies that fail the test.
     failed: Vec<u32>,
     /// Shapes with a new fat box, as each thread found them, ascending from list to list.
-    found: Vec<Vec<u32>>,
+    found: Vec<Apart<Vec<u32>>>,
     /// All of them.
     moved: Vec<u32>,
 }
@@ -188,20 +188,20 @@ impl FatBoxes {
         let sight = Sight { bodies, reach, outlines, first_shape, dt, unit };
         let size = workers.part(failed.len(), LEAST_BODIES);
         let count = failed.len().div_ceil(size);
-        found.resize_with(count.max(found.len()), Vec::new);
+        found.resize_with(count.max(found.len()), Apart::default);
         let columns = [x, y, cos, sin, slack].map(|column| &mut **column);
         let mut rest = Section { body: 0, shape: 0, columns, proxies };
         let parts = failed.chunks(size).zip(&mut *found).map(|(failed, found)| {
             let end = failed.last().map_or(0, |&body| body as usize + 1);
             (failed, rest.split_off(end, sight.first_shape(end)), found)
         });
-        workers.each(parts, |(failed, mut section, found)| {
+        workers.each(parts, |(failed, mut section, Apart(found))| {
             found.clear();
             failed.iter().for_each(|&body| section.look_at(body as usize, sight, found));
         });
         moved.clear();
         moved.reserve(outlines.len());
-        found[..count].iter().for_each(|found| moved.extend_from_slice(found));
+        found[..count].iter().for_each(|Apart(found)| moved.extend_from_slice(found));
         moved
     }
 

@@ -26,7 +26,7 @@ use super::Proxy;
 use super::curve::{BITS, hilbert};
 use super::node::{BITS_OF_FAN, FAN, Node};
 use super::sort::{ByLower, merge};
-use crate::workers::Workers;
+use crate::workers::{Apart, Workers};
 use std::ops::Range;
 use wide::f32x16;
 
@@ -57,7 +57,7 @@ pub struct Tree {
     moved: Vec<bool>,
     merged: Vec<[u32; 2]>,
     /// The search of each thread.
-    searches: Vec<Search>,
+    searches: Vec<Apart<Search>>,
 }
 
 /// Memory of a search.
@@ -220,12 +220,12 @@ impl Tree {
         let leaves = self.levels[0].len();
         let size = workers.part(leaves, LEAST_LEAVES);
         let count = leaves.div_ceil(size).max(1);
-        searches.resize_with(count.max(searches.len()), Search::default);
-        workers.each(searches[..count].iter_mut().enumerate(), |(part, search)| {
+        searches.resize_with(count.max(searches.len()), Apart::default);
+        workers.each(searches[..count].iter_mut().enumerate(), |(part, Apart(search))| {
             self.find_of(part * size..((part + 1) * size).min(leaves), proxies, search);
             search.sorted.sort(proxies.len(), &search.found[..search.len]);
         });
-        merge(proxies.len(), searches[..count].iter().map(|search| &search.sorted), out, workers);
+        merge(proxies.len(), searches[..count].iter().map(|Apart(search)| &search.sorted), out, workers);
         self.searches = searches;
     }
 
@@ -276,9 +276,9 @@ impl Tree {
         let mut searches = std::mem::take(&mut self.searches);
         let size = workers.part(moved.len(), LEAST_MOVED);
         let count = moved.len().div_ceil(size).max(1);
-        searches.resize_with(count.max(searches.len()), Search::default);
-        searches[..count].iter_mut().for_each(|search| search.found.clear());
-        workers.each(moved.chunks(size).zip(&mut searches), |(moved, Search { found, stack, .. })| {
+        searches.resize_with(count.max(searches.len()), Apart::default);
+        searches[..count].iter_mut().for_each(|Apart(search)| search.found.clear());
+        workers.each(moved.chunks(size).zip(&mut searches), |(moved, Apart(Search { found, stack, .. }))| {
             for &i in moved {
                 let proxy = &proxies[i as usize];
                 self.query(proxy, stack, |places, mut hits| {
@@ -294,8 +294,8 @@ impl Tree {
             }
         });
         let (first, rest) = searches[..count].split_at_mut(1);
-        let fresh = &mut first[0].found;
-        rest.iter().for_each(|search| fresh.extend_from_slice(&search.found));
+        let fresh = &mut first[0].0.found;
+        rest.iter().for_each(|Apart(search)| fresh.extend_from_slice(&search.found));
         fresh.sort_unstable();
         self.merged.clear();
         let stays = |pair: &&[u32; 2]| !pair.iter().any(|&i| self.moved[i as usize]);

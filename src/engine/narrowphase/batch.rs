@@ -18,7 +18,7 @@ use crate::lanes::{
     IndexList, LaneIndex, LaneWidth, Lanes, MOST_LANES, PickedIndices, Quad, Shared, align_frame,
 };
 use crate::shapes::Shape;
-use crate::workers::Workers;
+use crate::workers::{Apart, Workers};
 use bytemuck::bytes_of;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hasher};
@@ -154,7 +154,7 @@ pub struct Jobs {
     /// Number of jobs that each thread listed, for reuse.
     kept: Vec<usize>,
     /// What each thread found, for reuse.
-    results: Vec<PartResult>,
+    results: Vec<Apart<PartResult>>,
 }
 
 /// Least number of pairs to list, and to collide, that are worth a thread.
@@ -299,9 +299,9 @@ pub fn update(
     } else {
         // SAFETY: every pair has a contact of its own, and every part its own spare contacts.
         let (of_contacts, of_found) = unsafe { (shared.0.sent(), shared.1.sent()) };
-        results.resize_with(parts.max(results.len()), PartResult::default);
+        results.resize_with(parts.max(results.len()), Apart::default);
         let results = &mut results[..parts];
-        workers.each(results.iter_mut().enumerate(), |(part, PartResult { points, changes })| {
+        workers.each(results.iter_mut().enumerate(), |(part, Apart(PartResult { points, changes }))| {
             changes.clear();
             let jobs = part * size..((part + 1) * size).min(count);
             let lists = JobLists(lists.map(|list| list.part(jobs.clone())));
@@ -309,7 +309,7 @@ pub fn update(
             *points =
                 run(lists, input, room, &mut |name, contact, found| changes.push((name, *contact, found)));
         });
-        for PartResult { points: of_part, changes } in results {
+        for Apart(PartResult { points: of_part, changes }) in results {
             points += *of_part;
             changes.iter().for_each(|(name, contact, found)| change(*name, contact, *found));
         }

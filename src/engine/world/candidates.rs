@@ -8,6 +8,7 @@ use crate::contacts::pair_key;
 use crate::narrowphase::batch::{NO_CONTACT, PairKind};
 use crate::narrowphase::candidate::Candidate;
 use crate::params::SPECULATIVE_DISTANCE;
+use crate::workers::Apart;
 
 /// Allowance for rounding in a squared distance (1).
 const REACH_ROUNDING: f32 = 1.0 + 1e-5;
@@ -48,12 +49,12 @@ impl World {
         candidates.resize(pairs.len(), Candidate::NONE);
         let size = work.workers.part(pairs.len(), LEAST_PAIRS);
         let count = pairs.len().div_ceil(size);
-        listed.resize_with(count.max(listed.len()), Listed::default);
+        listed.resize_with(count.max(listed.len()), Apart::default);
         let (proxies, surfaces, shape_body) = (&self.proxies, &self.surfaces, &self.shape_body);
         let (joints, filters, unit) = (&self.joints, &self.filters, self.settings.length_unit);
         let may_ignore = !filters.is_empty() || joints.keeps_any_apart();
         let parts = pairs.chunks(size).zip(candidates.chunks_mut(size)).zip(&mut *listed);
-        work.workers.each((0..).step_by(size).zip(parts), |(first, ((pairs, candidates), listed))| {
+        work.workers.each((0..).step_by(size).zip(parts), |(first, ((pairs, candidates), Apart(listed)))| {
             let Listed { count, touching, of_kind } = listed;
             (*count, *touching) = (0, 0);
             of_kind.iter_mut().for_each(Vec::clear);
@@ -91,7 +92,7 @@ impl World {
         });
         of_kind.iter_mut().for_each(Vec::clear);
         let (mut end, mut touching) = (0, 0);
-        for (first, listed) in (0..).step_by(size).zip(&listed[..count]) {
+        for (first, Apart(listed)) in (0..).step_by(size).zip(&listed[..count]) {
             let left_out = first - end;
             if left_out > 0 {
                 candidates.copy_within(first..first + listed.count, end);

@@ -13,7 +13,7 @@ use crate::narrowphase::candidate::Candidate;
 use crate::narrowphase::circles::Rolling;
 use crate::narrowphase::frozen::Found;
 use crate::narrowphase::lanes::PoseRow;
-use crate::workers::Workers;
+use crate::workers::{Apart, Workers};
 use std::ops::Range;
 
 /// State of the narrow phase between steps.
@@ -23,7 +23,7 @@ pub(super) struct Narrow {
     pub candidates: Vec<Candidate>,
     pub last_candidates: Vec<Candidate>,
     /// The candidates of each thread, for reuse.
-    pub listed: Vec<Listed>,
+    pub listed: Vec<Apart<Listed>>,
     /// Candidates of shapes with seams.
     pub on_seams: Vec<u32>,
     /// Candidates by [`PairKind`].
