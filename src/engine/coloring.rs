@@ -48,21 +48,21 @@ impl Coloring {
     /// by edges of a color.
     ///
     /// Returns at once if the arguments are the same as in the last call, for example while a pile rests.
-    pub fn assign(&mut self, edges: &[[u32; 2]], body_count: usize) {
-        if self.is_current(edges, body_count) {
+    pub fn assign(&mut self, edges: impl ExactSizeIterator<Item = [u32; 2]> + Clone, body_count: usize) {
+        if self.is_current(edges.clone(), body_count) {
             return;
         }
         self.body_count = body_count;
         self.edges.clear();
-        self.edges.extend_from_slice(edges);
+        self.edges.extend(edges);
         self.used.clear();
         self.used.resize(body_count + 1, 0);
         self.color_of.clear();
-        self.color_of.reserve(edges.len());
+        self.color_of.reserve(self.edges.len());
 
         // Index MAX_COLORS counts overflow edges.
         let mut count = [0u32; MAX_COLORS + 1];
-        for &[a, b] in edges {
+        for &[a, b] in &self.edges {
             let (a, b) = ((a as usize).min(body_count), (b as usize).min(body_count));
             let color = (self.used[a] | self.used[b]).trailing_ones();
             count[color as usize] += 1;
@@ -96,8 +96,11 @@ impl Coloring {
     }
 
     /// Whether the coloring is that of these edges.
-    pub fn is_current(&self, edges: &[[u32; 2]], body_count: usize) -> bool {
-        self.body_count == body_count && self.edges == edges && !self.starts.is_empty()
+    pub fn is_current(&self, edges: impl ExactSizeIterator<Item = [u32; 2]>, body_count: usize) -> bool {
+        self.body_count == body_count
+            && !self.starts.is_empty()
+            && self.edges.len() == edges.len()
+            && self.edges.iter().copied().eq(edges)
     }
 
     /// Number of colors in use, not counting overflow.

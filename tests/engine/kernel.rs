@@ -77,7 +77,7 @@ fn batches(setup: &Setup, width: usize) -> Batches {
             .map(|c| [if kind { EXEMPT } else { c.body_a }, c.body_b])
             .collect();
         let mut coloring = Coloring::new();
-        coloring.assign(&edges, BODIES);
+        coloring.assign(edges.iter().copied(), BODIES);
         assert!(coloring.overflow().is_empty());
         let layout = Layout::for_features(&Features::FULL, partner);
         for color in 0..coloring.colors() {

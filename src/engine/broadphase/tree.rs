@@ -319,20 +319,27 @@ impl Tree {
         hits: impl Fn(&R, &Node) -> u32,
         mut visit: impl FnMut(&mut R, u32),
     ) {
-        if self.place.is_empty() {
-            return;
+        if !self.place.is_empty() {
+            self.visit_below([self.levels.len() - 1, 0], region, &hits, &mut visit);
         }
-        let mut stack = vec![[self.levels.len() - 1, 0]];
-        while let Some([level, node]) = stack.pop() {
-            let mut found = hits(region, &self.levels[level][node]);
-            while found != 0 {
-                let child = node * FAN + found.trailing_zeros() as usize;
-                found &= found - 1;
-                if level > 0 {
-                    stack.push([level - 1, child]);
-                } else {
-                    visit(region, self.order[child]);
-                }
+    }
+
+    /// As [`Self::visit`], below a node of a level.
+    fn visit_below<R>(
+        &self,
+        [level, node]: [usize; 2],
+        region: &mut R,
+        hits: &impl Fn(&R, &Node) -> u32,
+        visit: &mut impl FnMut(&mut R, u32),
+    ) {
+        let mut found = hits(region, &self.levels[level][node]);
+        while found != 0 {
+            let child = node * FAN + found.trailing_zeros() as usize;
+            found &= found - 1;
+            if level > 0 {
+                self.visit_below([level - 1, child], region, hits, visit);
+            } else {
+                visit(region, self.order[child]);
             }
         }
     }

@@ -29,6 +29,7 @@ use crate::contacts::Contact;
 use crate::disjoint::DisjointSets;
 use crate::lanes::BodyRow;
 use crate::shapes::{Aabb, Pose, Shape};
+use crate::workers::Workers;
 use advance::{Mover, impact};
 use glam::Vec2;
 use std::ops::Range;
@@ -52,13 +53,16 @@ pub struct Continuous {
     parts: Vec<f32>,
 }
 
+/// Least number of fast bodies that are worth a thread.
+const LEAST_FAST: usize = 32;
+
 /// Calls back with the proxies whose bounds overlap a box, and that a shape may meet.
 #[doc(hidden)]
-pub type Near<'w> = dyn Fn(u32, Aabb, &mut dyn FnMut(u32)) + 'w;
+pub type Near<'w> = dyn Fn(u32, Aabb, &mut dyn FnMut(u32)) + Sync + 'w;
 
 /// Calls back with the two bodies of every joint that has rigid rows.
 #[doc(hidden)]
-pub type EachJoined<'w> = dyn Fn(&mut dyn FnMut([u32; 2])) + 'w;
+pub type EachJoined<'w> = dyn Fn(&mut dyn FnMut([u32; 2])) + Sync + 'w;
 
 /// Input of [`Continuous::shorten`].
 #[derive(Clone, Copy)]
@@ -75,7 +79,7 @@ pub struct Moving<'w> {
     /// Overlap that position correction leaves uncorrected (m).
     pub slop: f32,
     /// Returns whether collisions between two shapes are disabled.
-    pub apart: &'w dyn Fn([u32; 2]) -> bool,
+    pub apart: &'w (dyn Fn([u32; 2]) -> bool + Sync),
     /// Visits shapes near an area that a shape may meet.
     pub near: &'w Near<'w>,
     pub joined: &'w EachJoined<'w>,
@@ -107,8 +111,8 @@ impl Continuous {
     }
 
     /// Shortens the motion of fast bodies up to the surfaces that they would pass; returns the number of fast
-    /// bodies.
-    pub fn shorten(&mut self, moving: Moving<'_>, rows: &mut [BodyRow]) -> usize {
+    /// bodies. Threads take some of them each.
+    pub fn shorten(&mut self, moving: Moving<'_>, rows: &mut [BodyRow], workers: &Workers) -> usize {
         press::hold(moving.bodies, moving.contacts, &self.safe_squared, moving.slop, rows);
         self.fast.clear();
         for (i, (row, safe)) in rows.iter().zip(&self.safe_squared).enumerate() {
@@ -117,11 +121,14 @@ impl Continuous {
                 self.fast.push((i as u32, 1.0));
             }
         }
+        let mut fast = std::mem::take(&mut self.fast);
+        let size = workers.part(fast.len(), LEAST_FAST);
+        workers.each(fast.chunks_mut(size), |fast| {
+            fast.iter_mut().for_each(|(body, part)| *part = self.part(moving, rows, *body as usize));
+        });
+        self.fast = fast;
         for k in 0..self.fast.len() {
-            let body = self.fast[k].0 as usize;
-            let part = self.part(moving, rows, body);
-            self.fast[k].1 = self.fast[k].1.min(part);
-            if moving.bodies.bullet[body] {
+            if moving.bodies.bullet[self.fast[k].0 as usize] {
                 self.meet_dynamic(moving, rows, k);
             }
         }

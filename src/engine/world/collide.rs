@@ -224,6 +224,7 @@ impl World {
             bodies: &self.bodies,
             contacts: &mut self.contacts,
             types: &self.work.types,
+            workers: &self.work.workers,
             speed_limits: &mut self.work.speed_limits,
             parameters: self.settings.scaled_parameters(),
             without: self.settings.without,

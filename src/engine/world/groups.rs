@@ -95,7 +95,7 @@ struct Seat {
     /// The contacts of a group, between rows of `work`.
     contacts: Vec<Contact>,
     solver: Option<(Box<dyn Solver>, &'static Variant)>,
-    seen_rows: Vec<u32>,
+    seen_rows: Vec<Vec<u32>>,
 }
 
 /// What all groups share.
@@ -286,7 +286,7 @@ impl Group {
         let sides = Sides { bodies: kinds.len(), partner, levels: None, asleep: &[] };
         assignment.colored(work, widths, features, contacts, &sides);
         if *is_large {
-            work.lanes.check_disjoint(kinds.len() as u32, seen_rows);
+            work.lanes.check_disjoint(kinds.len() as u32, seen_rows, &work.workers);
         }
         self.exchange(seat);
     }

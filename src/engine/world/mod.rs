@@ -139,7 +139,7 @@ pub struct World {
     assignment: Assignment,
     groups: Groups,
     /// Scratch memory of [`Batches::check_disjoint`](crate::constraints::records::batches::Batches::check_disjoint).
-    seen_rows: Vec<u32>,
+    seen_rows: Vec<Vec<u32>>,
     continuous: Continuous,
     /// Whether bodies were added or removed since `continuous` was built.
     continuous_is_stale: bool,
@@ -330,7 +330,7 @@ impl World {
                 });
                 self.continuous.build(each, |shape| surfaces[shape].half_width);
             }
-            let Workspace { types, rows, .. } = work;
+            let Workspace { types, rows, workers, .. } = work;
             let moving = Moving {
                 bodies,
                 shapes,
@@ -347,7 +347,7 @@ impl World {
                     rigid.for_each(|joined| joined.kind.ends().iter().for_each(|&ends| visit(ends)));
                 },
             };
-            self.counts.fast = self.continuous.shorten(moving, rows);
+            self.counts.fast = self.continuous.shorten(moving, rows, workers);
         }
         motion::store(&mut self.bodies, &self.work.rows, self.features.rotation, &self.work.workers);
     }
@@ -412,7 +412,7 @@ impl World {
         self.assign_lanes(&self.kernel_features());
         let is_whole = !self.groups.are_in_use();
         if is_whole && self.work.workers.count() > 1 && !self.work.lanes.is_checked() {
-            self.work.lanes.check_disjoint(self.bodies.len() as u32, &mut self.seen_rows);
+            self.work.lanes.check_disjoint(self.bodies.len() as u32, &mut self.seen_rows, &self.work.workers);
         }
         clock.lap(Phase::Color);
         self.load_rows();

@@ -4,6 +4,7 @@ use crate::constraints::records::features::{Features, Layout, LayoutOf, PartnerK
 use crate::constraints::records::order::SweepOrder;
 pub use crate::constraints::records::segment::Segment;
 use crate::lanes::{Block, IndexList, Indices, LaneIndex, Lanes};
+use crate::workers::Workers;
 use std::ops::Range;
 
 /// Attributes of a new [`Segment`] besides its records.
@@ -263,17 +264,26 @@ impl Batches {
     ///
     /// # Panics
     /// If they do.
-    pub(crate) fn check_disjoint(&mut self, inert: u32, seen: &mut Vec<u32>) {
-        seen.clear();
-        seen.resize(inert as usize + 1, 0);
-        for (number, segment) in (1..).zip(&self.segments).filter(|(_, segment)| segment.disjoint) {
-            let lanes = segment.first_lane..segment.first_lane + segment.contacts;
-            let pushed_a = if segment.pushes_a() { lanes.clone() } else { 0..0 };
-            for &row in self.row_a[pushed_a].iter().chain(&self.row_b[lanes]) {
-                let last = std::mem::replace(&mut seen[row as usize], number);
-                assert!(last != number, "row {row} twice in one color");
+    pub(crate) fn check_disjoint(&mut self, inert: u32, seen: &mut Vec<Vec<u32>>, workers: &Workers) {
+        let Batches { segments, row_a, row_b, .. } = self;
+        seen.resize_with(workers.count().max(seen.len()), Vec::new);
+        let seen = &mut seen[..workers.count()];
+        seen.iter_mut().for_each(|seen| {
+            seen.clear();
+            seen.resize(inert as usize + 1, 0);
+        });
+        workers.in_turn(segments, seen, |segment, seen| {
+            if !segment.disjoint {
+                return;
             }
-        }
+            let lanes = segment.first_lane..segment.first_lane + segment.contacts;
+            let (pushed_a, mark) =
+                (if segment.pushes_a() { lanes.clone() } else { 0..0 }, lanes.start as u32 + 1);
+            for &row in row_a[pushed_a].iter().chain(&row_b[lanes]) {
+                let last = std::mem::replace(&mut seen[row as usize], mark);
+                assert!(last != mark, "row {row} twice in one color");
+            }
+        });
         self.is_checked = true;
     }
 

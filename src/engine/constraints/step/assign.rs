@@ -2,12 +2,14 @@
 
 use super::Workspace;
 use crate::coloring::{Coloring, EXEMPT, OVERFLOW};
+use crate::constraints::kernels::types::ConstraintSet;
 use crate::constraints::records::batches::Place;
 use crate::constraints::records::features::{Features, Layout, PartnerKind};
 use crate::constraints::records::graph::{Graph, UNSUPPORTED};
 use crate::constraints::records::order::mixed;
 use crate::contacts::Contact;
 use crate::lanes::LaneWidth;
+use crate::workers::{Apart, Workers};
 
 /// A constraint that gets a lane.
 #[derive(Clone, Copy, Debug)]
@@ -28,20 +30,50 @@ impl Assigned {
     }
 }
 
-/// Constraints with one kind of body a, and their colors.
+/// Constraints with one kind of body a, one entry each in every list.
 #[derive(Clone, Debug, Default)]
-struct Group {
-    entries: Vec<Assigned>,
-    /// Rows of their bodies. a is exempt unless it is dynamic.
-    edges: Vec<[u32; 2]>,
-    coloring: Coloring,
+struct Entries {
+    index: Vec<u32>,
+    rows: Vec<[u32; 2]>,
+    /// See [`Assigned::place`]; empty if all are (0, 0).
+    places: Vec<(u32, u32)>,
+}
+
+impl Entries {
+    fn clear(&mut self) {
+        self.index.clear();
+        self.rows.clear();
+        self.places.clear();
+    }
+
+    fn extend(&mut self, other: &Entries) {
+        self.index.extend_from_slice(&other.index);
+        self.rows.extend_from_slice(&other.rows);
+        self.places.extend_from_slice(&other.places);
+    }
+
+    fn place(&self, entry: usize) -> (u32, u32) {
+        self.places.get(entry).copied().unwrap_or_default()
+    }
+
+    fn get(&self, entry: usize) -> Assigned {
+        let (level, kind) = self.place(entry);
+        Assigned { level, kind, index: self.index[entry], rows: self.rows[entry] }
+    }
+
+    /// Edges for a coloring: a is exempt unless it is dynamic.
+    fn edges(&self, partner: PartnerKind) -> impl ExactSizeIterator<Item = [u32; 2]> + Clone {
+        let exempt = if partner == PartnerKind::Dynamic { 0 } else { EXEMPT };
+        self.rows.iter().map(move |&[a, b]| [a | exempt, b])
+    }
 }
 
 /// Assigns lanes to constraints; keeps its memory from call to call.
 #[derive(Clone, Debug, Default)]
 pub struct Assignment {
-    /// One group per [`PartnerKind`].
-    groups: [Group; 3],
+    /// Constraints by [`PartnerKind`], as each thread lists them; in the end the first lists have all.
+    lists: Vec<Apart<[Entries; 3]>>,
+    colorings: [Coloring; 3],
     /// Entries of one color.
     color: Vec<Assigned>,
     /// Contacts in a shuffled order.
@@ -79,6 +111,9 @@ impl<F> Sides<'_, F> {
     }
 }
 
+/// Least number of contacts that are worth a thread.
+const LEAST_CONTACTS: usize = 1024;
+
 /// Cost of a batch's arithmetic, relative to the cost of gathering one lane.
 const BATCH_COST: usize = 12;
 
@@ -94,46 +129,41 @@ impl Assignment {
         widths: [LaneWidth; 2],
         features: &Features,
         contacts: &[Contact],
-        sides: &Sides<'_, impl Fn(u32) -> PartnerKind>,
+        sides: &Sides<'_, impl Fn(u32) -> PartnerKind + Sync>,
     ) {
         (self.colors, self.overflow) = (0, 0);
-        for group in &mut self.groups {
-            group.entries.clear();
-            group.edges.clear();
-        }
-        let all = contacts.iter().map(|c| [c.body_a, c.body_b]).enumerate().map(|(i, rows)| (0, i, rows));
-        let types = work.types.iter().enumerate().flat_map(|(k, joined)| {
-            joined.kind.ends().iter().enumerate().map(move |(i, &rows)| (k as u32 + 1, i, rows))
-        });
-        for (kind, index, rows) in all.chain(types).filter(|&(.., rows)| !sides.sleeps(rows)) {
-            let partner = (sides.partner)(rows[0]);
-            let group = &mut self.groups[partner as usize];
-            group.entries.push(Assigned { level: sides.level(rows), kind, index: index as u32, rows });
-            let a = if partner == PartnerKind::Dynamic { rows[0] } else { EXEMPT };
-            group.edges.push([a, rows[1]]);
-        }
-        for Group { edges, coloring, .. } in &mut self.groups {
-            coloring.assign(edges, sides.bodies);
+        let is_simple = sides.levels.is_none() && work.types.is_empty();
+        self.list(&work.types, contacts, sides, is_simple, &work.workers);
+        let Some(Apart(lists)) = self.lists.first() else { return };
+        for ((entries, coloring), partner) in lists.iter().zip(&mut self.colorings).zip(PartnerKind::ALL) {
+            coloring.assign(entries.edges(partner), sides.bodies);
         }
         work.clear_lanes(self.fitting(widths).lanes());
-        let is_simple = sides.levels.is_none() && work.types.is_empty();
         let inert = sides.bodies as u32;
         let color = &mut self.color;
         let mut stage = 0;
-        for (Group { entries, coloring, .. }, partner) in self.groups.iter_mut().zip(PartnerKind::ALL) {
+        for ((entries, coloring), partner) in lists.iter().zip(&self.colorings).zip(PartnerKind::ALL) {
             for of_color in 0..=coloring.colors() {
                 let serial = of_color == coloring.colors();
                 let edges = if serial { coloring.overflow() } else { coloring.color(of_color) };
-                color.clear();
-                color.extend(edges.iter().map(|&edge| entries[edge as usize]));
-                if !is_simple {
+                let place = |level| Place {
+                    partner,
+                    stage: level * STAGES_PER_LEVEL + stage,
+                    level,
+                    disjoint: !serial,
+                };
+                if is_simple {
+                    let of_edge = |&edge: &u32| (entries.index[edge as usize], entries.rows[edge as usize]);
+                    work.push(0, place(0), features, edges.iter().map(of_edge), inert);
+                } else {
+                    color.clear();
+                    color.extend(edges.iter().map(|&edge| entries.get(edge as usize)));
                     color.sort_unstable_by_key(|e| (e.place(), e.index));
-                }
-                for run in color.chunk_by(|a, b| a.place() == b.place()) {
-                    let Assigned { level, kind, .. } = run[0];
-                    let place =
-                        Place { partner, stage: level * STAGES_PER_LEVEL + stage, level, disjoint: !serial };
-                    work.push(kind, place, features, run.iter().map(|e| (e.index, e.rows)), inert);
+                    for run in color.chunk_by(|a, b| a.place() == b.place()) {
+                        let Assigned { level, kind, .. } = run[0];
+                        let run = run.iter().map(|e| (e.index, e.rows));
+                        work.push(kind, place(level), features, run, inert);
+                    }
                 }
                 self.overflow += if serial { edges.len() } else { 0 };
                 stage += 1;
@@ -143,11 +173,52 @@ impl Assignment {
         work.finish_lanes();
     }
 
+    /// Lists contacts, then constraints of other `types`. Each thread lists the contacts of a part.
+    fn list(
+        &mut self,
+        types: &[ConstraintSet],
+        contacts: &[Contact],
+        sides: &Sides<'_, impl Fn(u32) -> PartnerKind + Sync>,
+        is_simple: bool,
+        workers: &Workers,
+    ) {
+        let add = |lists: &mut [Entries; 3], kind: u32, index: usize, rows: [u32; 2]| {
+            if sides.sleeps(rows) {
+                return;
+            }
+            let list = &mut lists[(sides.partner)(rows[0]) as usize];
+            list.index.push(index as u32);
+            list.rows.push(rows);
+            if !is_simple {
+                list.places.push((sides.level(rows), kind));
+            }
+        };
+        let size = workers.part(contacts.len(), LEAST_CONTACTS);
+        let parts = contacts.len().div_ceil(size).max(1);
+        self.lists.resize_with(parts.max(self.lists.len()), Apart::default);
+        workers.each(self.lists[..parts].iter_mut().enumerate(), |(part, Apart(lists))| {
+            lists.iter_mut().for_each(Entries::clear);
+            let (first, last) = (part * size, ((part + 1) * size).min(contacts.len()));
+            for (i, contact) in (first..).zip(&contacts[first..last]) {
+                add(lists, 0, i, [contact.body_a, contact.body_b]);
+            }
+        });
+        let Some((Apart(all), rest)) = self.lists[..parts].split_first_mut() else { return };
+        for Apart(lists) in rest {
+            all.iter_mut().zip(lists).for_each(|(all, list)| all.extend(list));
+        }
+        for (kind, joined) in (1..).zip(types) {
+            for (i, &rows) in joined.kind.ends().iter().enumerate() {
+                add(all, kind, i, rows);
+            }
+        }
+    }
+
     /// The width of the cheapest sweep. A batch of W lanes costs about 12 + W: its arithmetic costs the same
     /// at every width, and its lanes are gathered one by one.
     fn fitting(&self, [narrowest, widest]: [LaneWidth; 2]) -> LaneWidth {
         let cost = |width: LaneWidth| {
-            let slots: usize = self.groups.iter().map(|g| g.coloring.lane_slots(width.lanes())).sum();
+            let slots: usize = self.colorings.iter().map(|c| c.lane_slots(width.lanes())).sum();
             slots / width.lanes() * (BATCH_COST + width.lanes())
         };
         let allowed = LaneWidth::ALL.into_iter().rev().filter(|w| (narrowest..=widest).contains(w));
@@ -159,9 +230,10 @@ impl Assignment {
     pub fn contact_colors(&self, contacts: usize) -> Vec<Option<u16>> {
         let mut colors = vec![None; contacts];
         let mut first = 0;
-        for Group { entries, coloring, .. } in &self.groups {
-            for (entry, &color) in entries.iter().zip(coloring.color_of()) {
-                let place = colors.get_mut(entry.index as usize).filter(|_| entry.kind == 0);
+        let Some(Apart(lists)) = self.lists.first() else { return colors };
+        for (entries, coloring) in lists.iter().zip(&self.colorings) {
+            for (entry, (&index, &color)) in entries.index.iter().zip(coloring.color_of()).enumerate() {
+                let place = colors.get_mut(index as usize).filter(|_| entries.place(entry).1 == 0);
                 place
                     .into_iter()
                     .for_each(|place| *place = (color != OVERFLOW).then(|| first + u16::from(color)));

@@ -54,6 +54,7 @@ use crate::constraints::kernels::types::ConstraintSet;
 use crate::contacts::{Contact, ManifoldPoint};
 use crate::disjoint::DisjointSets;
 use crate::narrowphase::Margins;
+use crate::workers::Apart;
 use glam::Vec2;
 
 /// Normals with a smaller product oppose each other (1). Friction holds a body in a wedge, so that impulses can grow
@@ -67,9 +68,39 @@ const NO_ROOM: f32 = 4.0;
 /// A contact: the bodies by which it is grouped, its index, and whether the normal keeps its sign.
 type GroupedContact = ([u32; 2], u32, bool);
 
+/// Least number of contacts that are worth a thread.
+const LEAST_CONTACTS: usize = 1024;
+
+/// Deep contacts and pressed bodies; see [`Jams`].
+#[derive(Clone, Debug, Default)]
+struct Scan {
+    deep: Vec<GroupedContact>,
+    pressed: Vec<(u32, f32)>,
+}
+
+impl Scan {
+    /// Looks at `contacts`, of which the first has the index `first`.
+    fn over(&mut self, contacts: &[Contact], first: usize, bodies: &Bodies, slop: f32) {
+        self.deep.clear();
+        self.pressed.clear();
+        for (i, contact) in (first..).zip(contacts) {
+            if contact.manifold.points().iter().any(|point| point.separation < -slop) {
+                self.deep.push(([contact.body_a, contact.body_b], i as u32, true));
+            }
+            for (by, of) in [(contact.body_a, contact.body_b), (contact.body_b, contact.body_a)] {
+                if bodies.kind[by as usize] == BodyKind::Kinematic {
+                    self.pressed.push((of, surface_speed(bodies, contact, by)));
+                }
+            }
+        }
+    }
+}
+
 /// Finds jams; reuses its memory from step to step.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Jams {
+    /// What each thread finds among the contacts.
+    scans: Vec<Apart<Scan>>,
     /// Deep contacts, by pair of bodies, and the contacts of each body in a squeeze.
     deep: Vec<GroupedContact>,
     /// Bodies that touch a kinematic one, and how fast its surface is there (m/s).
@@ -103,15 +134,16 @@ impl Jams {
         // Jams of the last step.
         self.forget_jams(contacts, bodies.len());
         self.jammed.clear();
-        for (i, contact) in contacts.iter().enumerate() {
-            if contact.manifold.points().iter().any(|point| point.separation < -slop) {
-                self.deep.push(([contact.body_a, contact.body_b], i as u32, true));
-            }
-            for (by, of) in [(contact.body_a, contact.body_b), (contact.body_b, contact.body_a)] {
-                if bodies.kind[by as usize] == BodyKind::Kinematic {
-                    self.pressed.push((of, surface_speed(bodies, contact, by)));
-                }
-            }
+        let size = scene.workers.part(contacts.len(), LEAST_CONTACTS);
+        let count = contacts.len().div_ceil(size);
+        self.scans.resize_with(count.max(self.scans.len()), Apart::default);
+        let parts = (0..).step_by(size).zip(contacts.chunks(size)).zip(&mut self.scans);
+        scene
+            .workers
+            .each(parts, |((first, contacts), Apart(scan))| scan.over(contacts, first, bodies, slop));
+        for Apart(scan) in &self.scans[..count] {
+            self.deep.extend_from_slice(&scan.deep);
+            self.pressed.extend_from_slice(&scan.pressed);
         }
         if !self.deep.is_empty() {
             self.hold(types, bodies);

@@ -7,6 +7,7 @@ use crate::constraints::records::graph::Graph;
 use crate::contacts::Contact;
 use crate::narrowphase::circles::Rolling;
 use crate::params::{Parameters, Without};
+use crate::workers::Workers;
 use std::fmt;
 
 /// A solver in one world: its schedule, and the data that it keeps from step to step.
@@ -68,6 +69,8 @@ pub struct CollisionScene<'a> {
     pub contacts: &'a mut [Contact],
     /// Constraints of other types than contacts.
     pub types: &'a [ConstraintSet],
+    /// Threads of the step.
+    pub workers: &'a Workers,
     /// Bodies whose speed [`Passes::limit_speeds`] bounds in this step, see [`Workspace`](super::Workspace).
     pub speed_limits: &'a mut Vec<(u32, f32)>,
     /// The solver's own parameters.
