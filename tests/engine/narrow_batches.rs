@@ -40,7 +40,7 @@ impl Scene {
         let poses: Vec<PoseRow> = poses.iter().map(PoseRow::new).collect();
         let names: Vec<u32> = (0..self.contact.len() as u32).collect();
         let mut jobs = Jobs::default();
-        jobs.list(&names, |i| {
+        jobs.list(&names, &Workers::default(), |i| {
             let (a, b) = (2 * i as usize, 2 * i as usize + 1);
             (true, [a as u32, b as u32], [self.numbers[a], self.numbers[b]], self.contact[i as usize])
         });

@@ -389,7 +389,7 @@ fn collide(kind: PairKind, width: LaneWidth, pairs: u32, contacts: usize, spoil:
     shapes.push(&shape.expect("valid"));
     let mut jobs = Jobs::default();
     let names: Vec<u32> = (0..pairs).collect();
-    jobs.list(&names, |_| (true, [0, 0], [0, 0], NO_CONTACT));
+    jobs.list(&names, &Workers::default(), |_| (true, [0, 0], [0, 0], NO_CONTACT));
     spoil(&mut jobs);
     let input = Input {
         poses: &[PoseRow::default()],

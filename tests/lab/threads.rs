@@ -42,6 +42,27 @@ fn every_number_of_threads_gives_the_same_bits() {
     }
 }
 
+/// Discs that come near, hit and leave each other in every step, and bodies that a machine jams.
+#[test]
+fn contacts_that_come_and_go_have_the_same_bits_in_threads() {
+    for name in ["junkyard", "washer"] {
+        let scene = scene(name);
+        for variant in ["soft_step", "shim"].map(|name| find(name).unwrap()) {
+            let run = |threads: usize| {
+                let mut world = scene.build(Settings { threads, ..Settings::new(variant) }).unwrap();
+                (0..90).for_each(|_| world.step().unwrap());
+                assert!(world.contacts.len() > 5000, "{name}: too few to divide");
+                let contacts: Vec<Vec<u8>> = world.contacts.iter().map(|c| bytes_of(c).to_vec()).collect();
+                (world.state_hash(), contacts, world.counts().fast)
+            };
+            let alone = run(1);
+            for threads in [2, 3, 8] {
+                assert!(run(threads) == alone, "{name} under {}, {threads} threads", variant.name);
+            }
+        }
+    }
+}
+
 /// Islands of all kinds, with the number of steps: pyramids, so many that threads share them; boxes that fall on kinematic
 /// boxes and each other, and discs that bounce.
 const ISLANDS: [(&str, usize); 3] = [("many_pyramids:9", 3), ("boxes", 90), ("discs", 90)];

@@ -20,6 +20,7 @@ use crate::narrowphase::seams::Seams;
 use crate::params::DIVERGED_SPEED;
 use crate::shapes::Shape;
 use crate::solvers::{self, Islands, Variant};
+use crate::workers::Workers;
 use candidates::ignores;
 use collide::Narrow;
 use edit::{Slots, StandingForces, Target};
@@ -388,6 +389,12 @@ impl World {
     #[doc(hidden)]
     pub fn workspace(&mut self) -> &mut Workspace {
         &mut self.work
+    }
+
+    /// The threads of the last step, for what is measured between steps.
+    #[doc(hidden)]
+    pub fn workers(&self) -> &Workers {
+        &self.work.workers
     }
 
     /// Starts the threads of the settings. A scene of few pairs is solved by this one alone: the others would have a

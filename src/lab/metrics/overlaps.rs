@@ -6,7 +6,7 @@ use crate::engine::contacts::Manifold;
 use crate::engine::narrowphase::collide;
 use crate::engine::params::SPECULATIVE_DISTANCE;
 use crate::engine::shapes::Pose;
-use crate::engine::workers::Workers;
+use crate::engine::workers::Apart;
 use crate::engine::world::World;
 use glam::{DVec2, Vec2};
 
@@ -16,20 +16,25 @@ pub struct Overlaps {
     broadphase: BroadPhase,
     proxies: Vec<Proxy>,
     pairs: Vec<[u32; 2]>,
+    /// What each thread found.
+    found: Vec<Apart<Vec<([u32; 2], Manifold)>>>,
 }
+
+/// Least number of pairs that are worth a thread.
+const LEAST_PAIRS: usize = 256;
 
 impl Default for Overlaps {
     fn default() -> Self {
         // Rebuilt in every call, so that results do not depend on earlier calls.
         let broadphase = BroadPhase::new(BroadPhaseKind::HashGrid);
-        Overlaps { broadphase, proxies: Vec::new(), pairs: Vec::new() }
+        Overlaps { broadphase, proxies: Vec::new(), pairs: Vec::new(), found: Vec::new() }
     }
 }
 
 impl Overlaps {
     /// Calls `each` with every pair of shapes within contact distance, ascending by
     /// [pair](crate::engine::contacts::pair_key). The order in a pair is that of a contact: the second shape
-    /// is that of a dynamic body. Pairs that a joint or filters keep apart are left out.
+    /// is that of a dynamic body. Pairs that a joint or filters keep apart are left out. The threads of the world share the work.
     pub fn find(&mut self, world: &World, mut each: impl FnMut([u32; 2], &Manifold)) {
         let (bodies, near) = (&world.bodies, SPECULATIVE_DISTANCE * world.settings.length_unit);
         // Bounds are relative to the first body: far from the origin they would lose precision.
@@ -43,20 +48,30 @@ impl Overlaps {
         };
         self.proxies.clear();
         self.proxies.extend(world.shapes().iter().zip(world.shape_body()).map(proxy));
-        self.broadphase.pairs(&self.proxies, &mut self.pairs, &Workers::default());
-        for &[i, j] in &self.pairs {
-            let [a, b] = if self.proxies[j as usize].dynamic { [i, j] } else { [j, i] };
-            let [body_a, body_b] = [a, b].map(|s| world.shape_body()[s as usize] as usize);
-            if world.keeps_apart([a, b]) {
-                continue;
+        let Overlaps { broadphase, proxies, pairs, found } = self;
+        let workers = world.workers();
+        broadphase.pairs(proxies, pairs, workers);
+        let size = workers.part(pairs.len(), LEAST_PAIRS);
+        let count = pairs.len().div_ceil(size);
+        found.resize_with(count.max(found.len()), Apart::default);
+        workers.each(pairs.chunks(size).zip(&mut *found), |(pairs, Apart(found))| {
+            found.clear();
+            for &[i, j] in pairs {
+                let [a, b] = if proxies[j as usize].dynamic { [i, j] } else { [j, i] };
+                let [body_a, body_b] = [a, b].map(|s| world.shape_body()[s as usize] as usize);
+                if world.keeps_apart([a, b]) {
+                    continue;
+                }
+                let [pose_a, pose_b] = bodies.relative_poses(body_a, body_b);
+                let [shape_a, shape_b] = [a, b].map(|s| &world.shapes()[s as usize]);
+                let manifold = collide(shape_a, &pose_a, shape_b, &pose_b, near);
+                if manifold.count > 0 {
+                    found.push(([a, b], manifold));
+                }
             }
-            let [pose_a, pose_b] = bodies.relative_poses(body_a, body_b);
-            let [shape_a, shape_b] = [a, b].map(|s| &world.shapes()[s as usize]);
-            let manifold = collide(shape_a, &pose_a, shape_b, &pose_b, near);
-            if manifold.count > 0 {
-                each([a, b], &manifold);
-            }
-        }
+        });
+        let found = found[..count].iter().flat_map(|Apart(found)| found);
+        found.for_each(|(pair, manifold)| each(*pair, manifold));
     }
 }
 
