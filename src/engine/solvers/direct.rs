@@ -24,7 +24,8 @@
 //! point on.
 //!
 //! **Fails when** bands are wide, and where friction allows a point neither to stick nor to slip consistently
-//! (Painlevé): then the states cycle, and the impulses of the sweeps remain.
+//! (Painlevé): then the states cycle, and the impulses of the sweeps remain. Where rows of joints that are apart nearly depend
+//! on each other, every row moves at its push speed, and bodies as fast as that takes (`papers/joints.md`).
 //!
 //! # The method
 //!

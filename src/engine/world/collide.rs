@@ -138,7 +138,6 @@ impl World {
         narrow.count = self.contacts.len();
         let kept = &mut self.work.kept;
         kept.follow(self.solver_is.kept, &self.contacts, self.bodies.len());
-        self.with_scene(|solver, scene| solver.after_collision(scene));
         self.counts.pairs = self.narrow.candidates.len();
         self.counts.contacts = self.contacts.len();
         self.counts.points = points;
@@ -219,7 +218,7 @@ impl World {
     }
 
     /// Calls a collision hook of the solver.
-    fn with_scene(&mut self, hook: impl FnOnce(&mut dyn Solver, &mut CollisionScene<'_>)) {
+    pub(super) fn with_scene(&mut self, hook: impl FnOnce(&mut dyn Solver, &mut CollisionScene<'_>)) {
         let mut scene = CollisionScene {
             bodies: &self.bodies,
             contacts: &mut self.contacts,

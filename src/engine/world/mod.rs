@@ -366,8 +366,8 @@ impl World {
         self.timings = clock.stop();
     }
 
-    /// Finds the contacts of the next step, with their warm-start impulses, without solving. The next step
-    /// then finds the same contacts. Nothing happens if a setting is out of its range.
+    /// Finds the contacts of the next step, with the impulses that they keep from the last one, without solving. The
+    /// next step has the same bits as without this call. Nothing happens if a setting is out of its range.
     pub fn find_contacts(&mut self) {
         if self.settings.check().is_err() {
             return;
@@ -412,6 +412,7 @@ impl World {
         self.update_pairs();
         clock.lap(Phase::Pairs);
         self.update_contacts();
+        self.with_scene(|solver, scene| solver.after_collision(scene));
         if self.settings.contact_events {
             self.note_approach();
         }

@@ -18,8 +18,8 @@ pub trait Solver: CloneSolver + fmt::Debug + Send + Sync {
     /// Called before candidates are collided. The contacts are those of the last step.
     fn before_collision(&mut self, _scene: &mut CollisionScene<'_>, _collision: &mut Collision) {}
 
-    /// Called after the collision, when impulses have been transferred. The contacts are those of the coming
-    /// step.
+    /// Called before the contacts of a step are solved, when impulses have been transferred. Impulses that it changes
+    /// are those that the step starts with.
     fn after_collision(&mut self, _scene: &mut CollisionScene<'_>) {}
 
     /// The contact graph, if contacts are to be grouped by its levels. Called before contacts get their
