@@ -114,8 +114,9 @@ impl Section<'_> {
     }
 
     /// Recomputes the boxes of one body if needed, and makes its pose the reference. Appends shapes with a new box.
-    fn look_at(&mut self, body: usize, sight: Sight<'_>, moved: &mut Vec<u32>) {
-        let Sight { bodies, reach, outlines, dt, unit, .. } = sight;
+    #[inline]
+    fn look_at(&mut self, body: usize, sight: &Sight<'_>, moved: &mut Vec<u32>) {
+        let Sight { bodies, reach, outlines, dt, unit, .. } = *sight;
         let pose = bodies.pose(body);
         let (first, last) = (sight.first_shape(body), sight.first_shape(body + 1));
         let speed = bodies.velocity(body).length();
@@ -197,7 +198,7 @@ impl FatBoxes {
         });
         workers.each(parts, |(failed, mut section, Apart(found))| {
             found.clear();
-            failed.iter().for_each(|&body| section.look_at(body as usize, sight, found));
+            failed.iter().for_each(|&body| section.look_at(body as usize, &sight, found));
         });
         moved.clear();
         moved.reserve(outlines.len());

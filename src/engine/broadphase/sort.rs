@@ -68,11 +68,18 @@ where
         (part, rest.split_off_mut(..len).expect("room for all pairs"))
     });
     workers.each(parts, |(part, mut out)| {
+        let mut lists = lists.clone();
+        let Some(first) = lists.next() else { return };
+        let is_only = lists.clone().next().is_none();
+        if is_only {
+            out.copy_from_slice(first.of(part.clone()));
+        }
         for proxy in part {
-            let mut len = 0;
-            for partners in lists.clone().map(|list| list.of(proxy..proxy + 1)) {
-                out[len..len + partners.len()].copy_from_slice(partners);
-                len += partners.len();
+            let own = first.of(proxy..proxy + 1);
+            let mut len = own.len();
+            if !is_only {
+                let partners = own.iter().chain(lists.clone().flat_map(|list| list.of(proxy..proxy + 1)));
+                len = out.iter_mut().zip(partners).map(|(to, &pair)| *to = pair).count();
             }
             sort_partners(out.split_off_mut(..len).expect("room for all pairs"));
         }
