@@ -155,8 +155,8 @@ impl Continuous {
             if way <= self.least_safe {
                 continue;
             }
-            // Slower bodies begin no farther from its path.
-            let area = swept(moving, rows, shape as usize).grown(way);
+            // None of its points moves farther, nor does a body that is not fast.
+            let area = mine.aabb.grown(2.0 * way);
             (moving.near)(shape, area, &mut |other| {
                 let Proxy { body, dynamic, .. } = moving.proxies[other as usize];
                 let is_passed = dynamic && way * way > self.safe_squared[body as usize];
