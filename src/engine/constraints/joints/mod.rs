@@ -105,8 +105,6 @@ pub struct Joints<T: JointType> {
     recorded: Vec<RecordedImpulses>,
     /// Sums of `kept` over the substeps of the step; empty unless they are recorded. `[joints × kept]`
     summed: Vec<f32>,
-    /// Whether each joint was found beyond what the rule pushes in this step; empty if none was. `[joints]`
-    apart: Vec<bool>,
     /// Substep to which the impulses belong (s).
     h: f32,
     /// Links of chains, whose rigid rows sweeps leave alone.
@@ -131,7 +129,6 @@ impl<T: JointType> Joints<T> {
             angles: vec![],
             recorded: vec![],
             summed: vec![],
-            apart: vec![],
             h,
             linked: Linked::default(),
             rigid: Self::rigid_block(form),
@@ -245,17 +242,17 @@ impl<T: JointType> Joints<T> {
         });
     }
 
-    fn warm_start<L: Lanes>(&mut self, on: TypeInput<'_>) {
+    fn warm_start<L: Lanes>(&self, on: TypeInput<'_>) {
         self.velocity_pass::<L, _>(on, |pair| JointWarmStart { pair, driving: false });
     }
 
-    fn sweep<L: Lanes>(&mut self, by: VelocityRule, on: TypeInput<'_>) {
-        self.velocity_pass::<L, _>(on, |pair| Velocities { pair, by, beyond: L::zero() });
+    fn sweep<L: Lanes>(&self, by: VelocityRule, on: TypeInput<'_>) {
+        self.velocity_pass::<L, _>(on, |pair| Velocities { pair, by });
     }
 
     /// A velocity pass that skips the rigid rows of links.
     fn velocity_pass<L: Lanes, P: JointPass<L> + DerefMut>(
-        &mut self,
+        &self,
         on: TypeInput<'_>,
         of: impl Fn(JointPair<L>) -> P,
     ) {
@@ -266,28 +263,26 @@ impl<T: JointType> Joints<T> {
         }
     }
 
-    fn displace<L: Lanes>(&mut self, by: DisplacementRule, on: TypeInput<'_>) {
+    fn displace<L: Lanes>(&self, by: DisplacementRule, on: TypeInput<'_>) {
         let moves = matches!(by, DisplacementRule::Position { .. });
         self.pass::<L, _>(on, moves, |pair| Displacements { pair, by });
     }
 
     #[inline(never)]
     fn pass<L: Lanes, P: JointPass<L>>(
-        &mut self,
+        &self,
         mut on: TypeInput<'_>,
         moves: bool,
         of: impl Fn(JointPair<L>) -> P,
     ) {
         let (first_kept, stride) = (self.first_kept(), self.stride());
         on.batches.for_each_record::<L>(stride, |at| {
-            let joints = &at.names.entries()[..at.filled];
             let VisitedRecord { record, rows, pushes, .. } = at.with_ends(self.swapped);
             let bodies = rows.map(|row| on.rows.gather::<L>(row));
             let (numbers, kept) = record.split_at_mut(first_kept);
             let (anchors, numbers) = numbers.split_at(ANCHORS);
             let mut pass = of(JointPair::new(bodies, anchors));
             T::rows(self.form, numbers, kept, &mut pass);
-            note_apart(&mut self.apart, self.joints.len(), joints, pass.beyond());
             let ([row_a, row_b], [a, b]) = (rows, pass.bodies);
             if !moves {
                 return write_velocities(&mut on.rows, rows, pushes, [a, b]);
@@ -393,17 +388,6 @@ impl JointNumbers<'_> {
     }
 }
 
-/// Notes the joints in the lanes where `beyond` is positive.
-#[inline(always)]
-fn note_apart<L: Lanes>(apart: &mut Vec<bool>, count: usize, joints: &[u32], beyond: L) {
-    if beyond.any_positive() {
-        apart.resize(count, false);
-        for (&joint, &beyond) in joints.iter().zip(bytemuck::cast_slice::<L, f32>(&[beyond])) {
-            apart[joint as usize] |= beyond > 0.0;
-        }
-    }
-}
-
 /// Writes back the velocities of bodies a and b, if impulses push them.
 #[inline(always)]
 fn write_velocities<L: Lanes>(
@@ -467,7 +451,6 @@ impl<T: JointType> ConstraintType for Joints<T> {
     fn begin(&mut self, bodies: &Bodies, h: f32) {
         self.recorded.clear();
         self.summed.clear();
-        self.apart.clear();
         if self.h != h {
             // Scales the impulses, so that the forces stay the same.
             let factor = if self.h > 0.0 { h / self.h } else { 1.0 };
@@ -563,10 +546,6 @@ impl<T: JointType> ConstraintType for Joints<T> {
     fn impulses(&self, constraint: usize) -> &[f32] {
         let kept = T::kept(self.form);
         &self.kept[constraint * kept..][..kept]
-    }
-
-    fn apart(&self) -> &[bool] {
-        &self.apart
     }
 
     fn recorded(&self, constraint: usize) -> Option<RecordedImpulses> {

@@ -65,8 +65,6 @@ impl<L: Lanes> JointPass<L> for JointWarmStart<L> {
 pub(super) struct Velocities<L> {
     pub pair: JointPair<L>,
     pub by: VelocityRule,
-    /// Positive where an error is too large to be pushed as the rule says.
-    pub beyond: L,
 }
 
 /// A velocity pass that leaves out the rigid rows of some joints.
@@ -106,11 +104,6 @@ impl<L: Lanes, P: JointPass<L> + DerefMut> JointPass<L> for Besides<L, P> {
         ease: L,
     ) {
         self.of.free(j, error, law, kept, ease);
-    }
-
-    #[inline(always)]
-    fn beyond(&self) -> L {
-        self.of.beyond() * self.taken
     }
 }
 
@@ -161,12 +154,11 @@ impl<L: Lanes> JointPass<L> for Velocities<L> {
         ];
         let [alpha, p, q] = match law {
             RowLaw::Rigid => {
-                error = self.pushed(&j, error);
+                error = solver.pushed(&j, error);
                 rigid
             }
             RowLaw::Limit => {
-                let pushed = self.pushed(&j, error.map(|x| x.min(L::zero())))[0];
-                error[0] = error[0].select_positive(error[0], pushed);
+                error[0] = error[0].select_positive(error[0], solver.pushed(&j, error)[0]);
                 let open = [one, L::splat(inv_h), one];
                 let of = |i: usize| error[0].select_positive(open[i], rigid[i]);
                 [of(0), of(1), of(2)]
@@ -210,25 +202,6 @@ impl<L: Lanes> JointPass<L> for Velocities<L> {
             self.pair.apply(&j[i], new[i] - impulse[i], VELOCITY);
             impulse[i] = new[i];
         }
-    }
-
-    #[inline(always)]
-    fn beyond(&self) -> L {
-        self.beyond
-    }
-}
-
-impl<L: Lanes> Velocities<L> {
-    /// [`Softness::pushed`], which only shortens errors.
-    #[inline(always)]
-    fn pushed<const N: usize>(&mut self, j: &[Jacobian<L>; N], errors: [L; N]) -> [L; N] {
-        let pushed = self.by.law.pushed(j, errors);
-        if self.by.law.bias_rate != 0.0 {
-            for i in 0..N {
-                self.beyond = (errors[i] - pushed[i]).mul_add(errors[i], self.beyond);
-            }
-        }
-        pushed
     }
 }
 

@@ -110,12 +110,6 @@ pub trait JointPass<L: Lanes>: Deref<Target = JointPair<L>> {
         self.block(j, error, law, kept);
     }
 
-    /// Positive in lanes where the errors of a block were too large for its law.
-    #[inline(always)]
-    fn beyond(&self) -> L {
-        L::zero()
-    }
-
     /// One row of [`Self::free`].
     #[inline(always)]
     fn free_row(&mut self, j: Jacobian<L>, error: L, law: RowLaw<L>, kept: &mut [L], ease: L) {

@@ -208,12 +208,6 @@ pub trait ConstraintType: Any + fmt::Debug + Send + Sync {
     /// ([`PassMode::Record`]), otherwise zeros.
     fn collect_recorded(&mut self, _constraint: usize, _on: BodyStates<'_>, _to: &mut Vec<RowBlock>) {}
 
-    /// Which constraints were found farther apart in this step than the rule of the solver pushes; may be empty. Those that are
-    /// at the start of a step are relaxed with the rows with which they were solved, as are all that are joined to them.
-    fn apart(&self) -> &[bool] {
-        &[]
-    }
-
     /// Relative angle of a constraint's bodies, counted across full turns (rad).
     fn angle(&self, _constraint: usize) -> f32 {
         0.0

@@ -1,7 +1,7 @@
 //! Passes over bodies.
 
+use super::Passes;
 use super::jams::speed;
-use super::{Passes, Workspace};
 use crate::clock::Phase;
 use crate::constraints::kernels::motion::Motion;
 use crate::constraints::kernels::velocity::masses::{EffectiveMasses, ScaledMasses};
@@ -47,8 +47,6 @@ impl Passes<'_> {
 
     /// Body pass: x ← x + h v.
     pub fn integrate_positions(&mut self) {
-        let Workspace { rows, types, apart, .. } = &mut *self.work;
-        apart.keep(types, rows);
         self.over_bodies(Phase::Integrate, |rows, motion, workers| motion.integrate_positions(rows, workers));
     }
 

@@ -3,7 +3,6 @@
 //! [`Passes`] is the whole interface of a solver. Its methods are in files by what they work on: `bodies`,
 //! `sweeps`, `impacts` and `vectors`. This file runs the passes.
 
-mod apart;
 #[doc(hidden)]
 pub mod assign;
 mod bodies;
@@ -15,7 +14,6 @@ mod sweeps;
 mod vectors;
 mod workspace;
 
-pub use apart::Apart;
 pub(crate) use drifts::Drifts;
 pub(crate) use impacts::ImpactWaves;
 pub use solver::{CloneSolver, Collision, CollisionScene, Schedule, Solver};
@@ -98,7 +96,6 @@ impl<'a> Passes<'a> {
             biased: false,
             driven: false,
         };
-        passes.work.apart.clear();
         passes.set_order(SweepOrder::Forward);
         for (batches, width) in [(&passes.work.lanes, width.lanes()), (&passes.work.serial, 1)] {
             batches.assert_fits(width, passes.work.rows.len(), passes.contacts.len());
@@ -270,13 +267,6 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// Exchanges the poses of bodies that are [`Apart`](apart::Apart), in relaxing passes.
-    fn swap_poses_of_apart(&mut self, phase: Phase) {
-        if phase == Phase::Relax {
-            self.work.apart.swap_poses(&mut self.work.rows);
-        }
-    }
-
     /// Whether sweeps have nothing to do: there are no contacts, and all rows of other types belong to links.
     fn has_no_sweeps(&self) -> bool {
         self.contacts.is_empty() && self.types_are_idle()
@@ -297,7 +287,6 @@ impl<'a> Passes<'a> {
     /// Runs over the constraints of other types with this rank.
     fn over_types(&mut self, phase: Phase, pass: &mut dyn AnyPass, part: Part, rank: u64) {
         let (width, mode, law, driven) = (self.width_of(part), pass.mode_of(), pass.law_of(), self.driven);
-        self.swap_poses_of_apart(phase);
         let Workspace { rows, types, poses, .. } = &mut *self.work;
         for ConstraintSet { kind, lanes, serial } in types {
             let batches = part.of(lanes, serial);
@@ -318,7 +307,6 @@ impl<'a> Passes<'a> {
                 });
             }
         }
-        self.swap_poses_of_apart(phase);
     }
 
     /// Runs over the constraints of other types, without the contacts.

@@ -83,13 +83,10 @@ impl Passes<'_> {
     pub fn solve_chains(&mut self, chains: &mut Chains, stage: ChainStage) {
         let phase = if stage == ChainStage::Relax { Phase::Relax } else { Phase::Solve };
         // No sweep has moved the bodies since.
-        let is_done = stage != ChainStage::Begin && self.has_no_sweeps() && self.work.apart.is_empty();
+        let is_done = stage != ChainStage::Begin && self.has_no_sweeps();
         if self.has_chains(chains) && !is_done {
-            self.swap_poses_of_apart(phase);
-            let Workspace { rows, types, apart, .. } = &mut *self.work;
-            let is_apart = |body| apart.has(body);
-            chains.solve(types, rows, [self.input.h, self.input.length_unit], stage, is_apart);
-            self.swap_poses_of_apart(phase);
+            let Workspace { rows, types, .. } = &mut *self.work;
+            chains.solve(types, rows, [self.input.h, self.input.length_unit], stage);
             self.clock.lap(phase);
         }
     }

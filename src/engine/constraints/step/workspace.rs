@@ -1,6 +1,5 @@
 //! Working data, inputs and counts of a step.
 
-use super::apart::Apart;
 use crate::constraints::impacts::{ImpactLaw, ImpactRecords};
 use crate::constraints::kernels::motion::Motion;
 use crate::constraints::kernels::observe::ObservedRule;
@@ -38,8 +37,6 @@ pub struct Workspace {
     /// Bodies that [`Passes::limit_speeds`](super::Passes::limit_speeds) slows down, in ascending order, each with the largest
     /// √(v² + ρ²ω²) that it may have (m/s); ρ is its radius of gyration.
     pub speed_limits: Vec<(u32, f32)>,
-    /// Bodies of joints that are apart.
-    pub apart: Apart,
     /// Vectors that solvers have returned, for reuse.
     pub vectors: Vec<PointVector>,
     /// Called after each iteration of a solver.
@@ -77,7 +74,6 @@ impl Clone for Workspace {
             kept: self.kept.clone(),
             impacts: self.impacts.clone(),
             speed_limits: self.speed_limits.clone(),
-            apart: Apart::default(),
             vectors: self.vectors.clone(),
             watch: None,
             observe: self.observe,

@@ -237,18 +237,16 @@ impl Chains {
     }
 
     /// Changes velocities so that the rows hold at the end of the substep of `h` (s). `length_unit`: size of
-    /// typical bodies (m). Chains of bodies that `is_apart` are relaxed even if sweeps have not moved them. Returns whether
-    /// there was something to solve.
+    /// typical bodies (m). Returns whether there was something to solve.
     pub fn solve(
         &mut self,
         types: &mut [ConstraintSet],
         rows: &mut [BodyRow],
         [h, length_unit]: [f32; 2],
         stage: ChainStage,
-        is_apart: impl Fn(u32) -> bool,
     ) -> bool {
         if stage != ChainStage::Begin {
-            self.system.find_moved(rows, |body| stage == ChainStage::Relax && is_apart(body));
+            self.system.find_moved(rows);
             if !self.system.any_moved() {
                 return false;
             }

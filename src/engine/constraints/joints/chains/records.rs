@@ -2,7 +2,7 @@
 
 use crate::constraints::joints::passes::{Besides, is_pair};
 use crate::constraints::joints::rows::{Jacobian, JointPair, JointPass, RowLaw};
-use crate::constraints::joints::{ANCHORS, JointType, Joints, note_apart, placed_anchors, write_velocities};
+use crate::constraints::joints::{ANCHORS, JointType, Joints, placed_anchors, write_velocities};
 use crate::constraints::kernels::frame::{INV_INERTIA, INV_MASS};
 use crate::constraints::kernels::types::{ConstraintType, TypeInput};
 use crate::constraints::records::batches::VisitedRecord;
@@ -112,18 +112,15 @@ impl<T: JointType> Joints<T> {
 
     /// Writes the rows of the links at the present state of bodies.
     pub(crate) fn write_links(&mut self, rows: &[BodyRow], by: LinkRule, to: &mut LinkRows) {
-        let Linked { groups, joints, bodies: [a, b], ways, records, kept, .. } = &mut self.linked;
-        let bodies = batches(joints).zip(batches(a).zip(batches(b)));
+        let Linked { groups, bodies: [a, b], ways, records, kept, .. } = &mut self.linked;
+        let bodies = batches(a).zip(batches(b));
         let records = records.chunks_exact(ANCHORS + T::numbers(self.form));
-        for (((&group, &way), record), (joints, (a, b))) in groups.iter().zip(&*ways).zip(records).zip(bodies)
-        {
+        for (((&group, &way), record), (a, b)) in groups.iter().zip(&*ways).zip(records).zip(bodies) {
             let bodies = [f32x8::gather(rows, a), f32x8::gather(rows, b)];
             let (anchors, numbers) = record.split_at(ANCHORS);
             let pair = JointPair::new(bodies, anchors);
-            let to = to.group_mut(group as usize);
-            let mut pass = LinkPass { pair, way, by, to, beyond: f32x8::ZERO };
+            let mut pass = LinkPass { pair, way, by, to: to.group_mut(group as usize) };
             T::rows(self.form, numbers, kept, &mut pass);
-            note_apart(&mut self.apart, self.joints.len(), joints.array(), pass.beyond);
         }
     }
 
@@ -135,7 +132,7 @@ impl<T: JointType> Joints<T> {
     /// As [`Self::pass`] over velocities, but skips the rigid rows of links.
     #[inline(never)]
     pub(crate) fn pass_besides<L: Lanes, P: JointPass<L> + DerefMut>(
-        &mut self,
+        &self,
         mut on: TypeInput<'_>,
         of: impl Fn(JointPair<L>) -> P,
     ) {
@@ -160,7 +157,6 @@ impl<T: JointType> Joints<T> {
             let (anchors, numbers) = numbers.split_at(ANCHORS);
             let mut pass = Besides { of: of(JointPair::new(bodies, anchors)), taken: taken[0] };
             T::rows(self.form, numbers, kept, &mut pass);
-            note_apart(&mut self.apart, self.joints.len(), joints, pass.beyond());
             write_velocities(&mut on.rows, rows, pushes, pass.bodies);
         });
     }
@@ -214,8 +210,6 @@ struct LinkPass<'a> {
     way: f32x8,
     by: LinkRule,
     to: &'a mut [f32x8],
-    /// 1 where an error is too large to be removed in the substep.
-    beyond: f32x8,
 }
 
 is_pair! { f32x8: LinkPass['a] }
@@ -232,7 +226,7 @@ impl JointPass<f32x8> for LinkPass<'_> {
         if !matches!(law, RowLaw::Rigid) {
             return;
         }
-        let LinkPass { pair, way, by, to, beyond } = self;
+        let LinkPass { pair, way, by, to } = self;
         let (way, inv_h, unit) = (*way, f32x8::splat(by.inv_h), f32x8::splat(by.length_unit));
         let most = f32x8::splat(MAX_PUSH_SPEED) * unit;
         let is_link = way * way;
@@ -247,7 +241,6 @@ impl JointPass<f32x8> for LinkPass<'_> {
         let is_fast = (square * (inv_h * inv_h)).simd_gt(most * most);
         if is_fast.any() {
             rate = is_fast.select(most / square.sqrt(), rate);
-            *beyond = is_fast.select(is_link, *beyond);
         }
         let (to, masses) = to.split_at_mut(to.len() - 4);
         for ((to, j), error) in to.as_chunks_mut::<5>().0.iter_mut().zip(j).zip(error) {

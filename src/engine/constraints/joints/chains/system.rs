@@ -230,21 +230,18 @@ impl ChainSystem {
         }
     }
 
-    /// Finds the chains in which a body has changed its velocity since they were solved, or `is_apart`. Only these are
+    /// Finds the chains in which a body has changed its velocity since they were solved. Only these are
     /// solved in the rest of this substep.
-    pub fn find_moved(&mut self, rows: &[BodyRow], is_apart: impl Fn(u32) -> bool) {
+    pub fn find_moved(&mut self, rows: &[BodyRow]) {
         for k in 0..self.groups {
-            let bodies = self.bodies.list().batch(k);
-            let velocity = velocity_of(rows, bodies);
+            let velocity = velocity_of(rows, self.bodies_of(k));
             let [x, y, w] = self.velocities[k];
             let same = velocity[VX].simd_eq(x) & velocity[VY].simd_eq(y) & velocity[W].simd_eq(w);
-            let apart = bodies.array().iter().enumerate().filter(|(_, body)| is_apart(**body));
-            let same = apart.fold(same.to_bitmask(), |same, (lane, _)| same & !(1 << lane));
-            if same == 0xFF {
+            if same.all() {
                 continue;
             }
             self.any_moved = true;
-            for lane in (0..LINK_LANES).filter(|lane| (same >> lane) & 1 == 0) {
+            for lane in (0..LINK_LANES).filter(|lane| (same.to_bitmask() >> lane) & 1 == 0) {
                 self.moved[self.chains[k * LINK_LANES + lane] as usize] = true;
             }
         }
