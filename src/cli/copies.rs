@@ -15,13 +15,21 @@ use crate::lab::study::{budget, open_scene, seed_of};
 use serde_json::{Value, json};
 use std::process::ExitCode;
 
-/// A figure of all copies: name, name and unit in JSON, values, and how to write one.
+/// A figure of all copies: name, values, and how to write one.
 struct Figure<'a> {
     name: &'a str,
-    key: &'a str,
     values: Vec<f64>,
     show: Box<dyn Fn(f64) -> String + 'a>,
 }
+
+/// Metrics that the JSON has, by their names in [`METRICS`](crate::lab::metrics::METRICS).
+const ERRORS: [&str; 5] = [
+    "held_depth_p99_m",
+    "rest_depth_max_m",
+    "penetration_max_m",
+    "residual_rms_lighter_weights",
+    "rest_speed_m_s",
+];
 
 /// Runs the copies, from as many seeds.
 pub fn run(args: &RunArgs, count: u32) -> Result<ExitCode, Error> {
@@ -44,11 +52,10 @@ pub fn run(args: &RunArgs, count: u32) -> Result<ExitCode, Error> {
     if !found.same_bits {
         note("note: the timed run had other bits than the measured one\n");
     }
-    let figures = figures(&one, &found);
     let lost = found.outcomes.iter().filter(|copy| copy.errors.is_none()).count();
     let held = found.outcomes.iter().filter(|copy| copy.errors.is_some() && copy.broken.is_none()).count();
     if args.json {
-        return print_json(&json(args, &one, &settings, &found, &figures, [held, lost])?);
+        return print_json(&json(args, &one, &settings, &found, [held, lost])?);
     }
     let copies = if count == 1 { "1 copy".into() } else { format!("{count} copies") };
     let mut text = format!(
@@ -67,6 +74,7 @@ pub fn run(args: &RunArgs, count: u32) -> Result<ExitCode, Error> {
         if settings.threads > 1 { format!("{} threads", settings.threads) } else { "one thread".into() };
     let time = si(1e-9 * found.copy_step_ns, "s");
     text += &format!("  {:<34}{time:>12}  mean of the whole run, {threads}\n", "time of a step of one copy");
+    let figures = figures(&one, &found);
     text += "error, mean over copies ± half of its 95 % interval\n";
     for Figure { name, values, show, .. } in &figures {
         let (mean, rest) = match Interval::of(values) {
@@ -95,25 +103,21 @@ fn figures<'a>(one: &Loaded, found: &'a Copies) -> Vec<Figure<'a>> {
     let mut list = vec![
         Figure {
             name: if rests { "overlap, 99 % and at rest" } else { "overlap that the solver left, 99 %" },
-            key: "overlap_m",
             values: errors().map(|e| e.penetration(rests)).collect(),
             show: in_unit("m"),
         },
         Figure {
             name: "greatest overlap",
-            key: "penetration_max_m",
             values: errors().map(|e| e.penetration_max()).collect(),
             show: in_unit("m"),
         },
         Figure {
             name: "force error, rms",
-            key: "force_error",
             values: errors().map(|e| e.law_rms_lighter()).collect(),
             show: Box::new(percent),
         },
         Figure {
             name: "speed at rest, last second",
-            key: "rest_speed_m_s",
             values: errors().map(|e| e.rest_velocity()).collect(),
             show: in_unit("m/s"),
         },
@@ -122,7 +126,6 @@ fn figures<'a>(one: &Loaded, found: &'a Copies) -> Vec<Figure<'a>> {
         let truths = || found.outcomes.iter().filter_map(|copy| copy.truth);
         list.push(Figure {
             name: "distance to reference value",
-            key: "reference_error",
             values: truths().filter_map(|truth| truth.error).collect(),
             show: in_unit(truth.unit),
         });
@@ -136,18 +139,22 @@ fn json(
     one: &Loaded,
     settings: &Settings,
     found: &Copies,
-    figures: &[Figure<'_>],
     [held, lost]: [usize; 2],
 ) -> Result<Value, Error> {
-    let mut all = serde_json::Map::new();
-    for Figure { key, values, .. } in figures {
-        let interval = Interval::of(values);
+    let summary = |values: Vec<f64>| {
+        let interval = Interval::of(&values);
         let ends = interval.and_then(|interval| interval.ends);
-        all.insert(
-            (*key).into(),
-            json!({ "mean": interval.map(|i| i.mean), "interval": ends, "copies": values }),
-        );
-    }
+        json!({ "mean": interval.map(|i| i.mean), "interval": ends, "copies": values })
+    };
+    let errors = |name: &str| {
+        let copies = found.outcomes.iter().filter_map(|copy| copy.errors.as_ref());
+        summary(copies.filter_map(|errors| errors.get(name)).collect())
+    };
+    let errors: serde_json::Map<_, _> = ERRORS.iter().map(|&name| (name.into(), errors(name))).collect();
+    let reference = one
+        .truth
+        .as_ref()
+        .map(|_| summary(found.outcomes.iter().filter_map(|copy| copy.truth?.error).collect()));
     Ok(json!({
         "environment": Environment::current(),
         "scene": args.scene,
@@ -160,7 +167,8 @@ fn json(
         "threads": settings.threads,
         "copy_step_ns": found.copy_step_ns,
         "bits_equal": found.same_bits,
-        "errors": all,
+        "errors": errors,
+        "reference_error": reference,
         "hold": held,
         "diverged": lost,
     }))

@@ -8,7 +8,7 @@ use crate::lab::overrides;
 use crate::lab::report::columns::{self, Column, SHEETS, Sheet};
 use crate::lab::scenes::tolerance::Tolerance;
 use crate::lab::scenes::{self, CATALOG, Loaded};
-use crate::lab::study::{DEFAULT_SOLVERS, budget, open_scene};
+use crate::lab::study::{DEFAULT_SOLVERS, budget, check_seed, open_scene};
 use crate::lab::units::{bodies, count, percent, si};
 use clap::Args;
 use serde_json::{Value, json};
@@ -149,6 +149,7 @@ fn columns(args: &ListArgs) -> Result<ExitCode, Error> {
 }
 
 fn scene(name: &str, args: &ListArgs) -> Result<ExitCode, Error> {
+    check_seed(name, args.seed)?;
     let loaded = open_scene(name, args.seed, None, None)?;
     match args.json {
         true => print(&loaded.scene.to_json()),

@@ -5,7 +5,7 @@ use super::values::{self, LaneArgs, SettingArgs, scene_help};
 use crate::engine::world::Settings;
 use crate::lab::error::Error;
 use crate::lab::profile::{self, profile, text};
-use crate::lab::study::open_scene;
+use crate::lab::study::{check_seed, open_scene};
 use crate::lab::trial::{Trial, TrialOutcome};
 use clap::Args;
 use serde_json::json;
@@ -83,7 +83,10 @@ pub fn run(args: &ProfileArgs) -> Result<ExitCode, Error> {
     }
     let settings =
         Settings { threads: args.threads, ..args.setting.settings()?.exactly(args.lanes.or_native()) };
-    let open = |name: &String| Ok(open_scene(name, args.seed, None, None)?.scene);
+    let open = |name: &String| {
+        check_seed(name, args.seed)?;
+        Ok(open_scene(name, args.seed, None, None)?.scene)
+    };
     let scenes = args.scenes.iter().map(open).collect::<Result<Vec<_>, Error>>()?;
     let mut reports = Vec::new();
     for scene in &scenes {

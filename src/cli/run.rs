@@ -22,7 +22,7 @@ use crate::lab::report::table::error_list;
 use crate::lab::report::units::{self, bodies, lanes_or_order, percent, ratio, si};
 use crate::lab::scenes::holds::Broken;
 use crate::lab::scenes::{Loaded, Scene};
-use crate::lab::study::{FailedAt, TruthError, budget, open_scene};
+use crate::lab::study::{FailedAt, TruthError, budget, check_seed, open_scene};
 use crate::lab::trial::{Trial, TrialOutcome};
 use clap::Args;
 use serde_json::{Value, json};
@@ -159,6 +159,7 @@ pub fn run(args: &RunArgs) -> Result<ExitCode, Error> {
             return Err(Error::invalid(name, "0 is too few: at least 1 is needed"));
         }
     }
+    check_seed(&args.scene, args.seed)?;
     if let Some(count) = args.copies {
         return copies::run(args, count);
     }

@@ -101,6 +101,21 @@ fn a_scene_in_pixels_is_told_to_set_its_length_unit() {
 }
 
 #[test]
+fn copies_have_errors_by_the_names_of_a_single_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let errors = |request: &str| {
+        let json: serde_json::Value = serde_json::from_str(&succeeds(folder.path(), request)).unwrap();
+        json["errors"].as_object().unwrap().clone()
+    };
+    let (one, all) =
+        (errors("run stack:2@1 --steps 30 --json"), errors("run stack:2 --copies 1 --steps 30 --json"));
+    assert_eq!(all.len(), 5);
+    for (name, figure) in all {
+        assert_eq!((&figure["mean"], &figure["copies"][0]), (&one[&name], &one[&name]), "{name}");
+    }
+}
+
+#[test]
 fn bad_requests_are_refused_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let table: &[(&str, &[&str])] = &[
@@ -130,6 +145,9 @@ fn bad_requests_are_refused_in_one_line() {
         ("completions tcsh", &["tcsh", "bash", "fish", "zsh"]),
         ("scene", &["simpulse list SCENE"]),
         ("list solvers --seed 2", &["seed", "solvers"]),
+        ("run stack:2@7 --seed 5", &["seed", "5", "'stack:2@7'", "7", "'stack:2'"]),
+        ("list stack:2@7 --seed 5", &["seed", "5", "'stack:2@7'", "7"]),
+        ("profile stack:2@7 --seed 5", &["seed", "5", "'stack:2@7'", "7"]),
         ("run stack:2 --order natral", &["'natral'", "file", "'parallel'"]),
         ("run stack:2 --order natural --lanes 8", &["lanes", "8"]),
         ("run stack:2 --substeps 0", &["substeps", "0"]),

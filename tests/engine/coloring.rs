@@ -142,3 +142,11 @@ fn a_path() {
     assert_eq!(coloring.order(), [0, 2, 1, 3, 4]);
     assert_eq!(coloring.starts(), [0, 2, 4, 5]);
 }
+
+/// Three bodies in a row, with three contacts between neighbors: the pairs take turns.
+#[test]
+fn repeated_pairs_take_turns() {
+    let mut coloring = Coloring::new();
+    coloring.assign(&[[0, 1], [0, 1], [0, 1], [1, 2], [1, 2], [1, 2]], 3);
+    assert_eq!(coloring.color_of(), [0, 2, 4, 1, 3, 5]);
+}

@@ -157,6 +157,36 @@ fn what_a_door_presses_does_not_leave_through_the_wall() {
     }
 }
 
+/// A rod that turns strikes a disc at rest. It touches the disc at a distance r from its pivot, and gives it (1 + e) ω r along its
+/// normal.
+#[test]
+fn a_turning_rod_strikes_what_is_in_its_way() {
+    let (half, radius, far) = (0.1_f64, 0.05_f64, 1.5_f64);
+    let r = (far * far - (half + radius).powi(2)).sqrt();
+    for spin in [2.0_f64, 5.0, 20.0, -20.0] {
+        for (k, e) in [(0, 1.0), (1, 1.0), (2, 0.5), (3, 0.0)] {
+            let smooth = |shape: SceneShape| SceneShape { friction: 0.0, restitution: e, ..shape };
+            let rod = SceneBody::new(BodyKind::Kinematic, [0.0; 2], smooth(SceneShape::rectangle(2.0, half)));
+            let angle = 0.9 + 0.05 * f64::from(k);
+            let disc = smooth(SceneShape::disc(radius));
+            let disc = SceneBody::dynamic([far * angle.cos(), spin.signum() * far * angle.sin()], disc);
+            let scene = Scene::new("striker", vec![rod.moving([0.0; 2], spin), disc]).weightless();
+            let mut world = scene.build(named("shim")).unwrap();
+            let speed = |world: &simpulse::engine::world::World| f64::from(world.bodies.velocity(1).length());
+            let steps = (0..60).take_while(|_| {
+                world.step().unwrap();
+                speed(&world) == 0.0
+            });
+            let steps = steps.count();
+            let (found, expected) = (speed(&world), (1.0 + e) * spin.abs() * r);
+            assert!(
+                (found / expected - 1.0).abs() < 0.02,
+                "{spin} rad/s, e = {e}: {found} for {expected} m/s, {steps}"
+            );
+        }
+    }
+}
+
 /// A rod on its tip with another body on it tips over. Continuous collision must not hold it in place while
 /// its speed grows.
 #[test]

@@ -184,3 +184,20 @@ fn a_heavy_box_does_not_bounce_on_light_ones() {
         assert!(speed < OF_A_STEP, "{ratio} : 1 on {count}: {speed} m/s");
     }
 }
+
+/// Planks of six boxes each, with twelve points between neighbors: a sweep takes turns among pairs of bodies.
+#[test]
+fn bodies_with_many_contacts_come_to_rest() {
+    for planks in [6, 10] {
+        let plank = |i: u32| {
+            let part = |k: u32| SceneShape::rectangle_at([0.1, 0.1], [0.3 * f64::from(k) - 0.75, 0.0]);
+            let shapes = (0..6).map(part).collect();
+            SceneBody { shapes, ..SceneBody::dynamic([0.0, 0.1 + 0.2 * f64::from(i)], part(0)) }
+        };
+        let scene = common::on_ground((0..planks).map(plank).collect());
+        for solver in ["shim", "soft_step", "box2d", "rapier"] {
+            let fastest = common::fastest(&common::run(&scene, common::named(solver), 600));
+            assert!(fastest < 1e-4, "{planks} planks, {solver}: {fastest} m/s");
+        }
+    }
+}

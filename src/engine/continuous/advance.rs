@@ -1,7 +1,7 @@
 //! Time of impact of two convex shapes that move and turn at constant rates.
 //!
 //! Shape a is at rest: b moves in the frame of a, by v along a straight line and by Δθ, both relative over
-//! the whole step. At a fraction t of the step, let n be the unit axis from a to b that separates the shapes
+//! the whole step. If a turns by φ, the line is the chord of an arc of radius R, at most R φ²/8 from it. At a fraction t of the step, let n be the unit axis from a to b that separates the shapes
 //! best, and d the distance along n. Over a further fraction s, no point of b approaches along n by more than
 //!
 //! ```text
@@ -100,13 +100,53 @@ impl Mover {
 /// The fraction of the step after which the second shape, in the frame of its center of mass, stops. It stops
 /// when it is as close to the first as a contact, if its middle would otherwise pass through. If it is that
 /// close at the start, (5) applies. If the first shape recedes, it stops later, by (4). At most `limit`.
-pub fn impact([shape_a, shape_b]: [&Shape; 2], [a, b]: [&Mover; 2], slop: f32, limit: f32) -> f32 {
+pub fn impact(shapes: [&Shape; 2], movers: [&Mover; 2], slop: f32, limit: f32) -> f32 {
+    let Some(Meeting { part, approach, own_approach }) = meeting(shapes, movers, slop, limit) else {
+        return limit;
+    };
+    let recedes = if own_approach > approach { 1.0 - approach / own_approach } else { 0.0 };
+    limit.min((1.0 - part).mul_add(recedes, part))
+}
+
+/// The fraction of the step after which the first shape, which nothing stops, takes the second along, and the displacement
+/// `[x, y, θ]` of the second over the step (m and rad); `None` unless the first approaches and would pass through it.
+///
+/// Let q and φ be the position and the rotation of b in the frame of a when they meet. From then on b is at rest in that frame:
+///
+/// ```text
+/// Δx_b = x_a + Δx_a + R(Δθ_a) (q − x_a) − x_b,     Δθ_b' = φ + Δθ_a
+/// ```
+pub fn taken_along(shapes: [&Shape; 2], [a, b]: [&Mover; 2], slop: f32) -> Option<(f32, [f32; 3])> {
+    let Meeting { part, approach, own_approach } = meeting(shapes, [a, b], slop, 1.0)?;
+    if approach <= own_approach {
+        return None;
+    }
+    let own = b.against(a);
+    let arm = own.at(part).position - a.pose.position;
+    let end = a.pose.position + a.displacement + Vec2::from_angle(a.turn).rotate(arm);
+    let way = end - b.pose.position;
+    Some((part, [way.x, way.y, part.mul_add(own.turn, a.turn)]))
+}
+
+/// Where a shape stops at another.
+struct Meeting {
+    /// Fraction of the step.
+    part: f32,
+    /// Approach of the two over the whole step, along the normal (m).
+    approach: f32,
+    /// The part of it that is due to the second shape (m).
+    own_approach: f32,
+}
+
+/// The meeting of two shapes, if it is before `limit` and the middle of the second would pass through the first; see
+/// [`impact`].
+fn meeting([shape_a, shape_b]: [&Shape; 2], [a, b]: [&Mover; 2], slop: f32, limit: f32) -> Option<Meeting> {
     let (own, reach) = (b.against(a), shape_b.reach());
     let width = shape_b.min_half_extent().min(reach);
     // At most the slop, so that the next step detects a contact; for small bodies, relative to their size.
     let near = slop.min(0.1 * width);
-    let Some(pair) = Collider::new(shape_a, shape_b) else { return limit };
-    let (mut part, mut pose) = (0.0_f32, own.pose);
+    let pair = Collider::new(shape_a, shape_b)?;
+    let (mut part, mut pose, mut approaches) = (0.0_f32, own.pose, [0.0; 2]);
     for _ in 0..MOST_AXES {
         let manifold = pair.collide([&a.pose, &pose], FAR);
         let separations = manifold.points().iter().map(|p| p.separation);
@@ -114,23 +154,25 @@ pub fn impact([shape_a, shape_b]: [&Shape; 2], [a, b]: [&Mover; 2], slop: f32, l
         let approach = -own.displacement.dot(manifold.normal);
         let passes = (1.0 - part) * approach - distance > 0.5 * width;
         if !passes {
-            return limit;
+            return None;
         }
+        approaches = [approach, -b.displacement.dot(manifold.normal)];
         if distance <= near {
             if part == 0.0 {
                 part = while_touching(&manifold, &own, width);
             }
-            let total = -b.displacement.dot(manifold.normal);
-            let recedes = if total > approach { 1.0 - approach / total } else { 0.0 };
-            return limit.min((1.0 - part).mul_add(recedes, part));
+            let [approach, own_approach] = approaches;
+            return Some(Meeting { part, approach, own_approach });
         }
         part = free_until(&own, shape_b, part, manifold.normal, [distance - 0.5 * near, 0.25 * near]);
         if part >= limit {
-            return limit;
+            return None;
         }
         pose = own.at(part);
     }
-    part
+    // It stops early, and does not go on with a shape that recedes.
+    let [approach, own_approach] = approaches;
+    Some(Meeting { part, approach, own_approach: own_approach.min(approach) })
 }
 
 /// The fraction of the step, at least `start`, until which no point of b gets closer than δ along `n`. The

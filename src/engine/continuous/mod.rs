@@ -7,16 +7,20 @@
 //! next step finds a contact there. The velocity is unchanged, so restitution and friction act as usual.
 //!
 //! Static and kinematic shapes stop every fast body; dynamic shapes stop bullets only
-//! ([`BodyDef::bullet`](crate::bodies::BodyDef::bullet)). Rotation is not traced: a spinning rod
+//! ([`BodyDef::bullet`](crate::bodies::BodyDef::bullet)). Rotation of dynamic bodies is not traced: a spinning rod
 //! whose center does not move may pass through a thin wall. In addition, the center of a slow body never
 //! enters a static shape, even under pressure.
+//!
+//! Nothing stops a kinematic body. If one would pass through a dynamic body, it takes that body along from where they meet, so
+//! that the next step finds a contact. The path of the body, thus prolonged, is cut at static shapes. Bodies connected by joints
+//! are not taken along.
 //!
 //! Bodies connected by joints take the same fraction of their step: a body that stopped alone would tear its
 //! joints.
 //!
 //! **Cost.** One comparison per body. For a fast body also a search of the broad phase, a test of its bounds
-//! against those of all kinematic shapes, and a few distance computations for the shapes that it may hit. The
-//! code is scalar, so the bits are the same at every width.
+//! against those of all kinematic shapes, and a few distance computations for the shapes that it may hit; for a kinematic
+//! shape that moves farther than half the smallest width of all dynamic bodies, a search. The code is scalar, so the bits are the same at every width.
 //!
 //! **Source.** Conservative advancement: `mirtich1996`.
 
@@ -30,8 +34,9 @@ use crate::disjoint::DisjointSets;
 use crate::lanes::BodyRow;
 use crate::shapes::{Aabb, Pose, Shape};
 use crate::workers::Workers;
-use advance::{Mover, impact};
+use advance::{Mover, impact, taken_along};
 use glam::Vec2;
+use std::cmp::Ordering;
 use std::ops::Range;
 
 /// The bodies of a world, and the fast ones of the last step.
@@ -45,6 +50,11 @@ pub struct Continuous {
     first_shape: Vec<u32>,
     /// Shapes of kinematic bodies.
     kinematic: Vec<u32>,
+    /// Half the smallest width of all dynamic bodies (m).
+    least_safe: f32,
+    /// Dynamic bodies that kinematic ones would pass through, each with the fraction of the step until they meet and its
+    /// displacement over the step `[x, y, θ]` (m and rad).
+    taken: Vec<(u32, f32, [f32; 3])>,
     /// Bodies that move farther than is safe in this step, each with the fraction of the step that it takes.
     fast: Vec<(u32, f32)>,
     /// Sets of bodies connected by joints. `[bodies]`
@@ -96,13 +106,16 @@ impl Continuous {
         self.safe_squared.clear();
         self.first_shape.clear();
         self.kinematic.clear();
+        self.least_safe = f32::INFINITY;
         self.first_shape.push(0);
         let count = bodies.size_hint().0;
         self.safe_squared.reserve(count);
         self.first_shape.reserve(count);
         for (kind, own) in bodies {
             let half = own.clone().map(|shape| half_width(shape as usize)).fold(f32::INFINITY, f32::min);
-            self.safe_squared.push(if kind == BodyKind::Dynamic { half * half } else { f32::INFINITY });
+            let is_dynamic = kind == BodyKind::Dynamic;
+            self.safe_squared.push(if is_dynamic { half * half } else { f32::INFINITY });
+            self.least_safe = if is_dynamic { self.least_safe.min(half) } else { self.least_safe };
             self.first_shape.push(own.end);
             if kind == BodyKind::Kinematic {
                 self.kinematic.extend(own);
@@ -111,9 +124,10 @@ impl Continuous {
     }
 
     /// Shortens the motion of fast bodies up to the surfaces that they would pass; returns the number of fast
-    /// bodies. Threads take some of them each.
+    /// bodies. Fast kinematic bodies take along what they would pass through. Threads take some of the fast bodies each.
     pub fn shorten(&mut self, moving: Moving<'_>, rows: &mut [BodyRow], workers: &Workers) -> usize {
         press::hold(moving.bodies, moving.contacts, &self.safe_squared, moving.slop, rows);
+        self.take_along(moving, rows);
         self.fast.clear();
         for (i, (row, safe)) in rows.iter().zip(&self.safe_squared).enumerate() {
             let [x, y, ..] = row.delta;
@@ -136,6 +150,47 @@ impl Continuous {
             self.stop_together(moving, rows);
         }
         self.fast.len()
+    }
+
+    /// Moves the bodies that kinematic ones would pass through to where these take them.
+    fn take_along(&mut self, moving: Moving<'_>, rows: &mut [BodyRow]) {
+        self.taken.clear();
+        for &shape in &self.kinematic {
+            let mine = &moving.proxies[shape as usize];
+            let [x, y, turn, _] = rows[mine.body as usize].delta;
+            let way = turn.abs().mul_add(moving.shapes[shape as usize].reach(), x.hypot(y));
+            if way <= self.least_safe {
+                continue;
+            }
+            // None of its points moves farther, nor does a body that is not fast.
+            let area = mine.aabb.grown(2.0 * way);
+            (moving.near)(shape, area, &mut |other| {
+                let Proxy { body, dynamic, .. } = moving.proxies[other as usize];
+                let is_passed = dynamic && way * way > self.safe_squared[body as usize];
+                if !is_passed
+                    || !moving.proxies[other as usize].may_meet(mine)
+                    || (moving.apart)([shape, other])
+                {
+                    return;
+                }
+                let (shapes, movers) = pair_of(moving, rows, [shape, other]);
+                if let Some((part, displacement)) = taken_along(shapes, movers.each_ref(), moving.slop) {
+                    self.taken.push((body, part, displacement));
+                }
+            });
+        }
+        if self.taken.is_empty() {
+            return;
+        }
+        // Of each body the first meeting, whatever the order in which they were found.
+        self.taken
+            .sort_by(|(a, t, x), (b, u, y)| (a, t, x).partial_cmp(&(b, u, y)).unwrap_or(Ordering::Equal));
+        self.taken.dedup_by_key(|taken| taken.0);
+        let taken = &mut self.taken;
+        (moving.joined)(&mut |ends| taken.retain(|(body, ..)| !ends.contains(body)));
+        for (body, _, displacement) in taken {
+            rows[*body as usize].delta[..3].copy_from_slice(displacement);
+        }
     }
 
     /// Shortens the motion of each fast body and of the bodies connected to it by joints.
@@ -216,7 +271,13 @@ impl Continuous {
 }
 
 /// The fraction of the step at which shape b hits shape a, at most `limit`.
-fn pair(moving: Moving<'_>, rows: &[BodyRow], [a, b]: [u32; 2], limit: f32) -> f32 {
+fn pair(moving: Moving<'_>, rows: &[BodyRow], pair: [u32; 2], limit: f32) -> f32 {
+    let (shapes, movers) = pair_of(moving, rows, pair);
+    impact(shapes, movers.each_ref(), moving.slop, limit)
+}
+
+/// Two shapes and the motions of their bodies.
+fn pair_of<'w>(moving: Moving<'w>, rows: &[BodyRow], [a, b]: [u32; 2]) -> ([&'w Shape; 2], [Mover; 2]) {
     let [body_a, body_b] = [a, b].map(|shape| moving.proxies[shape as usize].body as usize);
     let [pose_a, pose_b] = moving.bodies.relative_poses(body_a, body_b);
     let mover = |pose: Pose, body: usize| {
@@ -224,7 +285,7 @@ fn pair(moving: Moving<'_>, rows: &[BodyRow], [a, b]: [u32; 2], limit: f32) -> f
         Mover { pose, displacement: Vec2::new(x, y), turn }
     };
     let shapes = [a, b].map(|shape| &moving.shapes[shape as usize]);
-    impact(shapes, [&mover(pose_a, body_a), &mover(pose_b, body_b)], moving.slop, limit)
+    (shapes, [mover(pose_a, body_a), mover(pose_b, body_b)])
 }
 
 /// Bounds of a shape over the step: those of the disc about its center of mass that contains it at any

@@ -49,7 +49,7 @@ use crate::lab::trial::{Trial, TrialOutcome};
 use compare::Ratio;
 use found::{Found, FoundSetting, TunedBudget};
 use interleave::Interleaved;
-pub use plan::{StudyPlan, is_path, open_scene, seed_of};
+pub use plan::{StudyPlan, check_seed, is_path, open_scene, seed_of};
 pub use record::{FailedAt, Record, TruthError};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -409,6 +409,18 @@ pub fn seed_of(name: &str) -> Option<(&str, u64)> {
     Some((whole, seed.parse().ok()?))
 }
 
+/// Errors: a seed beside the one that the name of a scene has.
+pub fn check_seed(name: &str, seed: Option<u64>) -> Result<(), Error> {
+    match (seed_of(name), seed) {
+        (Some((whole, own)), Some(seed)) => {
+            let message =
+                format!("is {seed}, and '{name}' has {own}: leave one out, or name the scene '{whole}'");
+            Err(Error::invalid("seed", message))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Largest speed that a seed gives to a body of a scene without a random element, in length units per second: a fifth
 /// of what is visible.
 const DISTURBANCE: f64 = 1e-3;
