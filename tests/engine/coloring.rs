@@ -147,6 +147,6 @@ fn a_path() {
 #[test]
 fn repeated_pairs_take_turns() {
     let mut coloring = Coloring::new();
-    coloring.assign(&[[0, 1], [0, 1], [0, 1], [1, 2], [1, 2], [1, 2]], 3);
+    coloring.assign([[0, 1], [0, 1], [0, 1], [1, 2], [1, 2], [1, 2]].into_iter(), 3);
     assert_eq!(coloring.color_of(), [0, 2, 4, 1, 3, 5]);
 }
