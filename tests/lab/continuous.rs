@@ -187,6 +187,22 @@ fn a_turning_rod_strikes_what_is_in_its_way() {
     }
 }
 
+/// A plate and a disc fly at each other. They meet within a step, at the start of which the disc is farther away than the plate
+/// moves.
+#[test]
+fn a_plate_takes_along_what_flies_at_it() {
+    for (speed, plate_speed) in [(600.0, 60.0), (300.0, 30.0), (60.0, 60.0), (600.0, 600.0)] {
+        for gap in 1..=20 {
+            let plate = SceneBody::new(BodyKind::Kinematic, [0.0; 2], SceneShape::rectangle(0.05, 2.0));
+            let disc = SceneBody::dynamic([0.5 * f64::from(gap), 0.1], SceneShape::disc(0.05));
+            let bodies = vec![plate.moving([plate_speed, 0.0], 0.0), disc.moving([-speed, 0.0], 0.0)];
+            let world = run(&Scene::new("head_on", bodies).weightless(), named("shim"), 20);
+            let distance = world.bodies.center(1)[0] - world.bodies.center(0)[0];
+            assert!(distance > 0.0, "{speed} and {plate_speed} m/s, {gap}: {distance} m");
+        }
+    }
+}
+
 /// A rod on its tip with another body on it tips over. Continuous collision must not hold it in place while
 /// its speed grows.
 #[test]

@@ -127,13 +127,9 @@ impl Continuous {
     /// bodies. Fast kinematic bodies take along what they would pass through. Threads take some of the fast bodies each.
     pub fn shorten(&mut self, moving: Moving<'_>, rows: &mut [BodyRow], workers: &Workers) -> usize {
         press::hold(moving.bodies, moving.contacts, &self.safe_squared, moving.slop, rows);
-        self.take_along(moving, rows);
-        self.fast.clear();
-        for (i, (row, safe)) in rows.iter().zip(&self.safe_squared).enumerate() {
-            let [x, y, ..] = row.delta;
-            if x * x + y * y > *safe {
-                self.fast.push((i as u32, 1.0));
-            }
+        self.list_fast(rows);
+        if self.take_along(moving, rows) {
+            self.list_fast(rows);
         }
         let mut fast = std::mem::take(&mut self.fast);
         let size = workers.part(fast.len(), LEAST_FAST);
@@ -152,45 +148,62 @@ impl Continuous {
         self.fast.len()
     }
 
-    /// Moves the bodies that kinematic ones would pass through to where these take them.
-    fn take_along(&mut self, moving: Moving<'_>, rows: &mut [BodyRow]) {
-        self.taken.clear();
-        for &shape in &self.kinematic {
+    /// Lists the bodies that move farther than is safe.
+    fn list_fast(&mut self, rows: &[BodyRow]) {
+        self.fast.clear();
+        for (i, (row, safe)) in rows.iter().zip(&self.safe_squared).enumerate() {
+            let [x, y, ..] = row.delta;
+            if x * x + y * y > *safe {
+                self.fast.push((i as u32, 1.0));
+            }
+        }
+    }
+
+    /// Moves the bodies that kinematic ones would pass through to where these take them; returns whether there are any.
+    fn take_along(&mut self, moving: Moving<'_>, rows: &mut [BodyRow]) -> bool {
+        let Continuous { safe_squared, first_shape, kinematic, least_safe, taken, fast, .. } = self;
+        taken.clear();
+        for &shape in &*kinematic {
             let mine = &moving.proxies[shape as usize];
             let [x, y, turn, _] = rows[mine.body as usize].delta;
             let way = turn.abs().mul_add(moving.shapes[shape as usize].reach(), x.hypot(y));
-            if way <= self.least_safe {
+            if way <= *least_safe {
                 continue;
             }
-            // None of its points moves farther, nor does a body that is not fast.
-            let area = mine.aabb.grown(2.0 * way);
-            (moving.near)(shape, area, &mut |other| {
-                let Proxy { body, dynamic, .. } = moving.proxies[other as usize];
-                let is_passed = dynamic && way * way > self.safe_squared[body as usize];
-                if !is_passed
-                    || !moving.proxies[other as usize].may_meet(mine)
-                    || (moving.apart)([shape, other])
-                {
+            let mut meet = |other: u32| {
+                let proxy = &moving.proxies[other as usize];
+                let is_passed = proxy.dynamic && way * way > safe_squared[proxy.body as usize];
+                if !is_passed || !proxy.may_meet(mine) || (moving.apart)([shape, other]) {
                     return;
                 }
                 let (shapes, movers) = pair_of(moving, rows, [shape, other]);
                 if let Some((part, displacement)) = taken_along(shapes, movers.each_ref(), moving.slop) {
-                    self.taken.push((body, part, displacement));
+                    taken.push((proxy.body, part, displacement));
                 }
-            });
+            };
+            // None of its points moves farther, nor do most bodies that it would pass through.
+            (moving.near)(shape, mine.aabb.grown(2.0 * way), &mut meet);
+            let area = mine.aabb.grown(way);
+            for &(body, _) in &*fast {
+                let [x, y, ..] = rows[body as usize].delta;
+                if x * x + y * y > way * way {
+                    let own = first_shape[body as usize]..first_shape[body as usize + 1];
+                    own.filter(|&other| overlap(&swept(moving, rows, other as usize), &area))
+                        .for_each(&mut meet);
+                }
+            }
         }
-        if self.taken.is_empty() {
-            return;
+        if taken.is_empty() {
+            return false;
         }
         // Of each body the first meeting, whatever the order in which they were found.
-        self.taken
-            .sort_by(|(a, t, x), (b, u, y)| (a, t, x).partial_cmp(&(b, u, y)).unwrap_or(Ordering::Equal));
-        self.taken.dedup_by_key(|taken| taken.0);
-        let taken = &mut self.taken;
+        taken.sort_by(|(a, t, x), (b, u, y)| (a, t, x).partial_cmp(&(b, u, y)).unwrap_or(Ordering::Equal));
+        taken.dedup_by_key(|taken| taken.0);
         (moving.joined)(&mut |ends| taken.retain(|(body, ..)| !ends.contains(body)));
         for (body, _, displacement) in taken {
             rows[*body as usize].delta[..3].copy_from_slice(displacement);
         }
+        true
     }
 
     /// Shortens the motion of each fast body and of the bodies connected to it by joints.
