@@ -89,7 +89,7 @@ impl Mover {
     }
 
     /// Its motion relative to the moving frame of `other`.
-    fn against(&self, other: &Self) -> Self {
+    pub fn against(&self, other: &Self) -> Self {
         let back = Vec2::from_angle(-other.turn);
         let end = self.pose.position + self.displacement - other.pose.position - other.displacement;
         let displacement = back.rotate(end) + other.pose.position - self.pose.position;

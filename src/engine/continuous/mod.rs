@@ -177,6 +177,11 @@ impl Continuous {
                     return;
                 }
                 let (shapes, movers) = pair_of(moving, rows, [shape, other]);
+                // What moves no farther against the shape than is safe does not pass through it.
+                let way = movers[1].against(&movers[0]).displacement;
+                if way.length_squared() <= safe_squared[proxy.body as usize] {
+                    return;
+                }
                 if let Some((part, displacement)) = taken_along(shapes, movers.each_ref(), moving.slop) {
                     taken.push((proxy.body, part, displacement));
                 }
@@ -188,8 +193,8 @@ impl Continuous {
                 let [x, y, ..] = rows[body as usize].delta;
                 if x * x + y * y > way * way {
                     let own = first_shape[body as usize]..first_shape[body as usize + 1];
-                    own.filter(|&other| overlap(&swept(moving, rows, other as usize), &area))
-                        .for_each(&mut meet);
+                    let bounds = |other: u32| moving.proxies[other as usize].aabb.grown(x.abs().max(y.abs()));
+                    own.filter(|&other| overlap(&bounds(other), &area)).for_each(&mut meet);
                 }
             }
         }
