@@ -203,6 +203,17 @@ fn a_plate_takes_along_what_flies_at_it() {
     }
 }
 
+#[test]
+fn no_body_is_fast_once_continuous_collision_is_off() {
+    let disc = SceneBody::dynamic([0.0; 2], SceneShape::disc(0.05)).moving([100.0, 0.0], 0.0);
+    let mut world = Scene::new("fast", vec![disc]).weightless().build(named("shim")).unwrap();
+    for (continuous, fast) in [(true, 1), (false, 0)] {
+        world.settings.continuous = continuous;
+        world.step().unwrap();
+        assert_eq!(world.counts().fast, fast);
+    }
+}
+
 /// A rod on its tip with another body on it tips over. Continuous collision must not hold it in place while
 /// its speed grows.
 #[test]

@@ -307,6 +307,7 @@ impl World {
         for &belt in &self.belts {
             self.work.rows[belt as usize].delta[..3].fill(0.0);
         }
+        self.counts.fast = 0;
         if self.settings.continuous {
             let World {
                 bodies,
