@@ -17,8 +17,8 @@
 //! solved again before positions are integrated, and once more without errors, K λ' = −J v, after the
 //! relaxing sweeps. Otherwise the next substep would find the effects of the sweeps as errors, and remove
 //! them at the rate 1/h against the same contacts and motors. A chain whose velocities the first sweeps have
-//! left bit-identical is solved once. Contacts with a chain do not use the mass of one link but its apparent
-//! mass as a part of the chain; see `system/apparent.rs`.
+//! left bit-identical is solved once. Contacts with a beam do not use the mass of one plank but its apparent
+//! mass as a part of the beam; see `system/apparent.rs`.
 //!
 //! # Chains
 //!
@@ -194,14 +194,14 @@ impl Chains {
         length_unit: f32,
         pairs: impl Iterator<Item = [u32; 2]>,
     ) -> Option<(&mut ScaledMasses, &[f32])> {
+        if !self.system.may_have_beams() {
+            return None;
+        }
         self.loaded.clear();
         self.loaded.resize(rows.len(), false);
         let others =
             types.iter().filter(|joined| !joined.kind.is_idle()).flat_map(|joined| joined.kind.ends());
         pairs.chain(others.copied()).flatten().for_each(|body| self.loaded[body as usize] = true);
-        if !self.system.bears(&self.loaded) {
-            return None;
-        }
         self.write_rows(types, rows, LinkRule { inv_h: 0.0, length_unit });
         self.system.find_shares(&self.loaded, &mut self.shares);
         self.has_effective_mass_scaling().then_some((&mut self.masses, &self.shares))
