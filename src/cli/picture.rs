@@ -8,7 +8,7 @@ use crate::lab::metrics::overlaps::Overlaps;
 use crate::lab::overrides;
 use crate::lab::picture::draw::{WIDTHS, draw};
 use crate::lab::picture::frame::{Frame, Stage};
-use crate::lab::study::open_scene;
+use crate::lab::study::{check_seed, open_scene};
 use crate::lab::units::{quantity, si};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -49,6 +49,7 @@ pub fn run(args: &RunArgs, path: &Path) -> Result<ExitCode, Error> {
     if !(darkest > 0.0 && darkest.is_finite()) {
         return Err(Error::invalid("--scale", format!("{scale} is no positive length")));
     }
+    check_seed(&args.scene, args.seed)?;
     let scene = open_scene(&args.scene, args.seed, None, args.dt)?.scene;
     let mut world = scene.build(settings(args, args.setting.settings()?)?)?;
     for _ in 0..step {

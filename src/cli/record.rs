@@ -11,7 +11,7 @@ use crate::lab::files::Pending;
 use crate::lab::recording::page::{MOST, RecordingPanel, page};
 use crate::lab::recording::record::{Caption, record_trial};
 use crate::lab::report::style::Style;
-use crate::lab::study::open_scene;
+use crate::lab::study::{check_seed, open_scene};
 use crate::lab::trial::Trial;
 use clap::Args;
 use std::io::Write;
@@ -43,6 +43,7 @@ pub fn run(args: &RunArgs, path: &Path) -> Result<ExitCode, Error> {
     }
     let of = |solver| settings(args, SettingArgs { solver, ..args.setting.clone() }.settings()?);
     let chosen = solvers.iter().map(|solver| of(*solver)).collect::<Result<Vec<_>, Error>>()?;
+    check_seed(&args.scene, args.seed)?;
     let loaded = open_scene(&args.scene, args.seed, args.steps, args.dt)?;
     let scene = &loaded.scene;
     // Created now, so that a file that cannot be written is reported before the runs.
