@@ -10,6 +10,9 @@ use crate::engine::workers::Apart;
 use crate::engine::world::World;
 use glam::{DVec2, Vec2};
 
+/// A pair of shapes, and where they touch.
+type Overlap = ([u32; 2], Manifold);
+
 /// Searches pairs; buffers are kept from call to call.
 #[derive(Clone, Debug)]
 pub struct Overlaps {
@@ -17,7 +20,7 @@ pub struct Overlaps {
     proxies: Vec<Proxy>,
     pairs: Vec<[u32; 2]>,
     /// What each thread found.
-    found: Vec<Apart<Vec<([u32; 2], Manifold)>>>,
+    found: Vec<Apart<Vec<Overlap>>>,
 }
 
 /// Least number of pairs that are worth a thread.
