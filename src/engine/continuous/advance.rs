@@ -1,8 +1,9 @@
 //! Time of impact of two convex shapes that move and turn at constant rates.
 //!
 //! Shape a is at rest: b moves in the frame of a, by v along a straight line and by Δθ, both relative over
-//! the whole step. If a turns by φ, the line is the chord of an arc of radius R, at most R φ²/8 from it. At a fraction t of the step, let n be the unit axis from a to b that separates the shapes
-//! best, and d the distance along n. Over a further fraction s, no point of b approaches along n by more than
+//! the whole step. If a turns by φ, the line is the chord of an arc of radius R, at most R φ²/8 from it. At a fraction t of
+//! the step, let n be the unit axis from a to b that separates the shapes best, and d the distance along n. Over a further
+//! fraction s, no point of b approaches along n by more than
 //!
 //! ```text
 //! s c,   c = max(−v·n, 0) + |Δθ| r                                               (1)

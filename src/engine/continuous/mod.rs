@@ -20,7 +20,8 @@
 //!
 //! **Cost.** One comparison per body. For a fast body also a search of the broad phase, a test of its bounds
 //! against those of all kinematic shapes, and a few distance computations for the shapes that it may hit; for a kinematic
-//! shape that moves farther than half the smallest width of all dynamic bodies, a search. The code is scalar, so the bits are the same at every width.
+//! shape that moves farther than half the smallest width of all dynamic bodies, a search. The code is scalar, so the bits are
+//! the same at every width.
 //!
 //! **Source.** Conservative advancement: `mirtich1996`.
 
