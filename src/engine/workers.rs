@@ -179,6 +179,25 @@ impl Workers {
         });
     }
 
+    /// Calls `each` with the parts of `items`, as [`Self::part`] divides them: the index of the first item, the items, and what
+    /// the thread writes. There is at least one part, which may be empty. Returns what was written, in the order of the parts.
+    pub fn each_part<'f, T: Sync, F: Default + Send>(
+        &self,
+        items: &[T],
+        least: usize,
+        found: &'f mut Vec<Apart<F>>,
+        each: impl Fn(usize, &[T], &mut F) + Sync,
+    ) -> &'f mut [Apart<F>] {
+        let size = self.part(items.len(), least);
+        let count = items.len().div_ceil(size).max(1);
+        found.resize_with(count.max(found.len()), Apart::default);
+        let found = &mut found[..count];
+        self.each((0..).step_by(size).zip(&mut *found), |(first, Apart(found))| {
+            each(first, &items[first..(first + size).min(items.len())], found);
+        });
+        found
+    }
+
     /// Size of parts of `len` things, one part for each thread, in whole cache lines of floats; no part is smaller than
     /// `least`.
     pub fn part(&self, len: usize, least: usize) -> usize {
@@ -327,6 +346,22 @@ mod tests {
             let (mut items, mut seats) = ([0; 50], vec![0; workers.count()]);
             workers.in_turn(&mut items, &mut seats, |item, seat| (*item, *seat) = (*item + 1, *seat + 1));
             assert_eq!((items, seats.iter().sum::<i32>()), ([1; 50], 50), "{threads} threads");
+        }
+    }
+
+    #[test]
+    fn every_item_is_in_one_part() {
+        for threads in [1, 2, 3] {
+            let (workers, mut found) = (with(threads), vec![]);
+            for len in [100, 0, 1, 16, 17, 33] {
+                let items: Vec<usize> = (0..len).collect();
+                let parts = workers.each_part(&items, 1, &mut found, |first, items, found: &mut Vec<_>| {
+                    assert!(items.iter().all(|item| (first..first + items.len()).contains(item)));
+                    items.clone_into(found);
+                });
+                assert!((1..=threads).contains(&parts.len()));
+                assert_eq!(parts.iter().flat_map(|Apart(found)| found).copied().collect::<Vec<_>>(), items);
+            }
         }
     }
 

@@ -217,15 +217,16 @@ impl Tree {
     /// Finds all pairs: each leaf against itself and against the later leaves that overlap its bounds.
     fn find_all(&mut self, proxies: &[Proxy], out: &mut Vec<[u32; 2]>, workers: &Workers) {
         let mut searches = std::mem::take(&mut self.searches);
-        let leaves = self.levels[0].len();
-        let size = workers.part(leaves, LEAST_LEAVES);
-        let count = leaves.div_ceil(size).max(1);
-        searches.resize_with(count.max(searches.len()), Apart::default);
-        workers.each(searches[..count].iter_mut().enumerate(), |(part, Apart(search))| {
-            self.find_of(part * size..((part + 1) * size).min(leaves), proxies, search);
-            search.sorted.sort(proxies.len(), &search.found[..search.len]);
-        });
-        merge(proxies.len(), searches[..count].iter().map(|Apart(search)| &search.sorted), out, workers);
+        let found = workers.each_part(
+            &self.levels[0],
+            LEAST_LEAVES,
+            &mut searches,
+            |first, leaves, search: &mut Search| {
+                self.find_of(first..first + leaves.len(), proxies, search);
+                search.sorted.sort(proxies.len(), &search.found[..search.len]);
+            },
+        );
+        merge(proxies.len(), found.iter().map(|Apart(search)| &search.sorted), out, workers);
         self.searches = searches;
     }
 
@@ -274,11 +275,9 @@ impl Tree {
         self.moved.resize(proxies.len(), false);
         moved.iter().for_each(|&i| self.moved[i as usize] = true);
         let mut searches = std::mem::take(&mut self.searches);
-        let size = workers.part(moved.len(), LEAST_MOVED);
-        let count = moved.len().div_ceil(size).max(1);
-        searches.resize_with(count.max(searches.len()), Apart::default);
-        searches[..count].iter_mut().for_each(|Apart(search)| search.found.clear());
-        workers.each(moved.chunks(size).zip(&mut searches), |(moved, Apart(Search { found, stack, .. }))| {
+        let parts = workers.each_part(moved, LEAST_MOVED, &mut searches, |_, moved, search: &mut Search| {
+            let Search { found, stack, .. } = search;
+            found.clear();
             for &i in moved {
                 let proxy = &proxies[i as usize];
                 self.query(proxy, stack, |places, mut hits| {
@@ -293,7 +292,7 @@ impl Tree {
                 });
             }
         });
-        let (first, rest) = searches[..count].split_at_mut(1);
+        let (first, rest) = parts.split_at_mut(1);
         let fresh = &mut first[0].0.found;
         rest.iter().for_each(|Apart(search)| fresh.extend_from_slice(&search.found));
         fresh.sort_unstable();

@@ -54,10 +54,7 @@ impl Overlaps {
         let Overlaps { broadphase, proxies, pairs, found } = self;
         let workers = world.workers();
         broadphase.pairs(proxies, pairs, workers);
-        let size = workers.part(pairs.len(), LEAST_PAIRS);
-        let count = pairs.len().div_ceil(size);
-        found.resize_with(count.max(found.len()), Apart::default);
-        workers.each(pairs.chunks(size).zip(&mut *found), |(pairs, Apart(found))| {
+        let parts = workers.each_part(pairs, LEAST_PAIRS, found, |_, pairs, found: &mut Vec<Overlap>| {
             found.clear();
             for &[i, j] in pairs {
                 let [a, b] = if proxies[j as usize].dynamic { [i, j] } else { [j, i] };
@@ -73,7 +70,7 @@ impl Overlaps {
                 }
             }
         });
-        let found = found[..count].iter().flat_map(|Apart(found)| found);
+        let found = parts.iter().flat_map(|Apart(found)| found);
         found.for_each(|(pair, manifold)| each(*pair, manifold));
     }
 }

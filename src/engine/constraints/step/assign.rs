@@ -193,17 +193,14 @@ impl Assignment {
                 list.places.push((sides.level(rows), kind));
             }
         };
-        let size = workers.part(contacts.len(), LEAST_CONTACTS);
-        let parts = contacts.len().div_ceil(size).max(1);
-        self.lists.resize_with(parts.max(self.lists.len()), Apart::default);
-        workers.each(self.lists[..parts].iter_mut().enumerate(), |(part, Apart(lists))| {
+        let list = |first: usize, contacts: &[Contact], lists: &mut [Entries; 3]| {
             lists.iter_mut().for_each(Entries::clear);
-            let (first, last) = (part * size, ((part + 1) * size).min(contacts.len()));
-            for (i, contact) in (first..).zip(&contacts[first..last]) {
+            for (i, contact) in (first..).zip(contacts) {
                 add(lists, 0, i, [contact.body_a, contact.body_b]);
             }
-        });
-        let Some((Apart(all), rest)) = self.lists[..parts].split_first_mut() else { return };
+        };
+        let parts = workers.each_part(contacts, LEAST_CONTACTS, &mut self.lists, list);
+        let Some((Apart(all), rest)) = parts.split_first_mut() else { return };
         for Apart(lists) in rest {
             all.iter_mut().zip(lists).for_each(|(all, list)| all.extend(list));
         }

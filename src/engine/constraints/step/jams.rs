@@ -134,14 +134,9 @@ impl Jams {
         // Jams of the last step.
         self.forget_jams(contacts, bodies.len());
         self.jammed.clear();
-        let size = scene.workers.part(contacts.len(), LEAST_CONTACTS);
-        let count = contacts.len().div_ceil(size);
-        self.scans.resize_with(count.max(self.scans.len()), Apart::default);
-        let parts = (0..).step_by(size).zip(contacts.chunks(size)).zip(&mut self.scans);
-        scene
-            .workers
-            .each(parts, |((first, contacts), Apart(scan))| scan.over(contacts, first, bodies, slop));
-        for Apart(scan) in &self.scans[..count] {
+        let scan =
+            |first: usize, contacts: &[Contact], scan: &mut Scan| scan.over(contacts, first, bodies, slop);
+        for Apart(scan) in scene.workers.each_part(contacts, LEAST_CONTACTS, &mut self.scans, scan) {
             self.deep.extend_from_slice(&scan.deep);
             self.pressed.extend_from_slice(&scan.pressed);
         }
